@@ -1,0 +1,71 @@
+#include "cli/common.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/whole_file.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <thread>
+
+namespace crampfit::cli {
+
+namespace {
+
+constexpr int most_threads = 4096;  // more is a slip of the finger
+
+} // namespace
+
+void add_common_options(CLI::App& command, CommonOptions& common) {
+    common.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, most_threads);
+    command.add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    command.add_option("--threads", common.threads, "Cores to use; all of them unless told")
+        ->type_name("N")
+        ->check(CLI::Range(1, most_threads));
+    command.add_flag("--quiet", common.quiet, "No progress on standard error");
+    command.add_option("--log", common.log, "Append what happens, with the time, to this file")->type_name("FILE");
+}
+
+Overrides overrides_of(const CommonOptions& common) {
+    Overrides overrides;
+    for (const std::string& setting : common.settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals == std::string::npos || equals == 0)
+            throw InputError("command line", "--set", setting, "must be KEY=VALUE");
+        overrides.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+    }
+    return overrides;
+}
+
+void check_output(const std::filesystem::path& output, const std::filesystem::path& input) {
+    if (output.empty())
+        throw InputError("command line", "-o", "", "must be the name of a file");
+    std::error_code neither_exists;
+    if (std::filesystem::equivalent(output, input, neither_exists))
+        throw InputError("command line", "-o", output.string(), "must not be the file that is read");
+    require_writable(output);
+}
+
+void complain(const std::string& line) {
+    std::fputs(("crampfit: " + line + '\n').c_str(), stderr);
+}
+
+void print(const std::string& text) {
+    const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+    if (!written && errno != EPIPE)
+        throw InputError("standard output", "", "", fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+void report(const CommonOptions& common, const std::string& line) {
+    spdlog::info(line);
+    if (!common.quiet)
+        complain(line);
+}
+
+} // namespace crampfit::cli

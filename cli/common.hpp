@@ -1,0 +1,47 @@
+#pragma once
+
+#include "datasets/io.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+/// The crampfit command, one file a verb.
+namespace crampfit::cli {
+
+enum class ExitStatus {
+    done = 0,
+    incomplete = 1,     // the run or fit did not reach its end; what it has is saved
+    bad_input = 2,      // or bad usage
+    interrupted = 130,  // what it has is saved
+};
+
+/// Options that every verb takes.
+struct CommonOptions {
+    std::vector<std::string> settings;  // KEY=VALUE
+    int threads = 1;
+    bool quiet = false;
+    std::filesystem::path log;  // empty: none
+};
+
+/// Adds them to the command and sets their defaults.
+void add_common_options(CLI::App& command, CommonOptions& common);
+
+/// Splits each KEY=VALUE at its first '='. Throws InputError for one without a key or '='.
+Overrides overrides_of(const CommonOptions& common);
+
+/// Throws InputError unless a result can be saved there without harm to the input.
+void check_output(const std::filesystem::path& output, const std::filesystem::path& input);
+
+/// A line on standard error, where there is one: a run does not end because nobody listens.
+void complain(const std::string& line);
+
+/// Writes to standard output. A reader that has left, such as `head`, is no error.
+void print(const std::string& text);
+
+/// A line on standard error, unless --quiet, and in the log.
+void report(const CommonOptions& common, const std::string& line);
+
+} // namespace crampfit::cli

@@ -1,0 +1,104 @@
+#include "cli/verbs.hpp"
+#include "datasets/error.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/null_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <fcntl.h>
+#include <new>
+#include <unistd.h>
+
+namespace crampfit::cli {
+
+namespace {
+
+/// From here on, what is logged goes to the file of --log.
+void start_log(const CommonOptions& common, const std::vector<std::string>& words) {
+    if (common.log.empty())
+        return;
+    try {
+        spdlog::set_default_logger(spdlog::basic_logger_mt("file", common.log.string()));
+    } catch (const spdlog::spdlog_ex&) {
+        throw InputError("command line", "--log", common.log.string(), "must be a file that can be written");
+    }
+    spdlog::set_pattern("%Y-%m-%dT%H:%M:%S%z %l: %v");
+    spdlog::flush_on(spdlog::level::trace);
+    spdlog::info("crampfit {}: {}", CRAMPFIT_VERSION, fmt::join(words, " "));
+}
+
+/// Stands in for closed standard streams, so that no file of ours gets their numbers. Printing to a closed standard output
+/// stays an error.
+void fill_closed_streams() {
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (::fcntl(stream, F_GETFD) < 0)
+            ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
+}
+
+ExitStatus fail(ExitStatus status, const std::string& message) {
+    spdlog::error(message);
+    complain("error: " + message);
+    return status;
+}
+
+/// `--help` and `--version` end the reading as well, with success.
+ExitStatus end_of_reading(const CLI::App& command, const CLI::ParseError& end) {
+    if (end.get_exit_code() != 0)
+        return fail(ExitStatus::bad_input, fmt::format("{} (see crampfit --help)", end.what()));
+    command.exit(end);
+    return ExitStatus::done;
+}
+
+ExitStatus run_verb(const std::vector<Verb>& verbs) {
+    for (const Verb& verb : verbs)
+        if (verb.arguments->parsed())
+            return verb.run();
+    throw std::logic_error("a command line without a verb was accepted");
+}
+
+ExitStatus run_command(int argc, const char* const* argv) {
+    CLI::App command("Couples crack-growth simulations of wood to experiments.", "crampfit");
+    command.set_version_flag("--version", "crampfit " CRAMPFIT_VERSION);
+    command.require_subcommand(1);
+    command.fallthrough();  // common options may stand after the verb
+    command.footer("Exit status: 0 done; 1 the run or fit did not reach its end; 2 bad input or usage; 130 interrupted.");
+    CommonOptions common;
+    add_common_options(command, common);
+    const std::vector<Verb> verbs{simulate_verb(command, common), explain_verb(command, common), fit_verb(command, common),
+                                  csv_verb(command, common)};
+    for (const Verb& verb : verbs)
+        verb.arguments->footer("Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
+    try {
+        command.parse(argc, argv);
+    } catch (const CLI::ParseError& end) {
+        return end_of_reading(command, end);
+    }
+    start_log(common, {argv, argv + argc});
+    return run_verb(verbs);
+}
+
+} // namespace
+
+} // namespace crampfit::cli
+
+int main(int argc, char** argv) {
+    using crampfit::cli::ExitStatus, crampfit::cli::fail;
+    crampfit::cli::fill_closed_streams();
+    // A reader that leaves and a file that grows too large are errors of a write, not ends of the process.
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
+    // What is logged before --log is read, or without it, goes nowhere.
+    spdlog::set_default_logger(spdlog::null_logger_mt("nowhere"));
+    try {
+        return static_cast<int>(crampfit::cli::run_command(argc, argv));
+    } catch (const crampfit::InputError& error) {
+        return static_cast<int>(fail(ExitStatus::bad_input, error.what()));
+    } catch (const std::bad_alloc&) {
+        return static_cast<int>(fail(ExitStatus::incomplete, "not enough memory"));
+    } catch (const std::exception& error) {
+        return static_cast<int>(fail(ExitStatus::incomplete, error.what()));
+    }
+}

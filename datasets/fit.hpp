@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+enum class FitStatus {
+    converged,
+    run_limit,      // max_runs was used up
+    interrupted,
+    failed,         // no forward run ended
+};
+
+const char* name(FitStatus status);
+
+struct FittedParameter {
+    std::string name;
+    std::string key;         // several joined by a space
+    double value = 0;        // in `unit`
+    std::string unit;
+    double standard_error = 0;
+    double lower_95 = 0;
+    double upper_95 = 0;
+    double initial = 0;
+    bool at_bound = false;
+};
+
+/// One forward evaluation of the whole study.
+struct FitRun {
+    std::vector<double> parameters;  // in the parameters' units
+    double misfit = 0;               // sum of squared weighted residuals; infinite when a run failed
+    std::string status;
+    double seconds = 0;
+};
+
+/// One data point of one experiment against the model at the best parameters.
+struct FitResidual {
+    std::string experiment;
+    std::string kind;       // "force" or "arrival"
+    double at = 0;          // displacement [m] for force; crack length [m] for arrival
+    double measured = 0;    // SI
+    double modelled = 0;    // SI
+    double sigma = 0;       // SI
+    double residual = 0;    // (modelled - measured) / sigma
+};
+
+/// What a fit gives.
+struct Fit {
+    FitStatus status = FitStatus::converged;
+    std::string message;
+    std::string method;                  // what did the work, and why it was chosen
+    std::vector<FittedParameter> parameters;
+    Eigen::MatrixXd covariance;          // in the parameters' units
+    Eigen::MatrixXd correlation;
+    double misfit = 0;                   // sum of squared weighted residuals
+    double reduced_chi_square = 0;
+    std::vector<FitResidual> residuals;
+    std::vector<FitRun> runs;
+    double seconds = 0;                  // wall time [s]
+    unsigned seed = 0;
+    std::string study_text;
+};
+
+} // namespace crampfit

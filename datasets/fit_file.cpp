@@ -1,0 +1,212 @@
+#include "datasets/hdf5.hpp"
+#include "datasets/io.hpp"
+
+#include <limits>
+
+namespace crampfit {
+
+using hdf5::Group;
+
+namespace {
+
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct TextColumn {
+    const char* name;
+    std::string FittedParameter::*value;
+    const char* description;
+};
+struct NumberColumn {
+    const char* name;
+    double FittedParameter::*value;
+    const char* description;
+};
+
+constexpr TextColumn parameter_texts[] = {
+    {"name", &FittedParameter::name, "name in the study"},
+    {"key", &FittedParameter::key, "keys of the scenes, with a space between"},
+    {"unit", &FittedParameter::unit, "unit of this parameter's numbers; empty for a pure number"},
+};
+constexpr NumberColumn parameter_numbers[] = {
+    {"value", &FittedParameter::value, "best value"},
+    {"standard_error", &FittedParameter::standard_error, "standard error"},
+    {"lower_95", &FittedParameter::lower_95, "lower end of the 95 % interval"},
+    {"upper_95", &FittedParameter::upper_95, "upper end of the 95 % interval"},
+    {"initial", &FittedParameter::initial, "where the search began"},
+};
+
+const char* const parameter_units = "of parameters/unit";
+const char* const residual_units = "m for displacement and crack length, N for force, s for time";
+
+/// Copies one member of every row into a column of its own.
+template <class Row, class Value> std::vector<Value> column_of(const std::vector<Row>& rows, Value Row::*member) {
+    std::vector<Value> column;
+    for (const Row& row : rows)
+        column.push_back(row.*member);
+    return column;
+}
+
+template <class Row, class Value>
+void fill_column(std::vector<Row>& rows, Value Row::*member, const std::vector<Value>& column) {
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        rows[i].*member = column[i];
+}
+
+// ---- parameters
+
+void write_parameters(Group& root, const std::vector<FittedParameter>& parameters) {
+    Group group = root.make_group("parameters", "what was fitted; the table `parameters`");
+    for (const TextColumn& column : parameter_texts)
+        group.write_texts(column.name, column_of(parameters, column.value), column.description);
+    for (const NumberColumn& column : parameter_numbers)
+        group.write(column.name, column_of(parameters, column.value), {parameter_units, column.description});
+    std::vector<std::uint8_t> at_bound;
+    for (const FittedParameter& parameter : parameters)
+        at_bound.push_back(parameter.at_bound);
+    group.write("at_bound", at_bound, {"1", "1 where the best value lies at a bound, 0 elsewhere"});
+}
+
+std::vector<FittedParameter> read_parameters(const Group& group) {
+    std::vector<FittedParameter> parameters(group.read_texts("name").size());
+    for (const TextColumn& column : parameter_texts)
+        fill_column(parameters, column.value, group.read_texts(column.name, parameters.size()));
+    for (const NumberColumn& column : parameter_numbers)
+        fill_column(parameters, column.value, group.read_column<double>(column.name, parameters.size()));
+    const std::vector<std::uint8_t> at_bound = group.read_column<std::uint8_t>("at_bound", parameters.size());
+    for (std::size_t i = 0; i < parameters.size(); ++i)
+        parameters[i].at_bound = at_bound[i] != 0;
+    return parameters;
+}
+
+// ---- matrices: empty when there is no estimate
+
+void write_matrix(Group& root, const char* matrix_name, const Eigen::MatrixXd& matrix, const hdf5::Meaning& meaning) {
+    const RowMajorMatrix rows = matrix;
+    root.write(matrix_name, std::vector<double>(rows.data(), rows.data() + rows.size()),
+               {static_cast<std::size_t>(rows.rows()), static_cast<std::size_t>(rows.cols())}, meaning);
+}
+
+Eigen::MatrixXd read_matrix(const Group& root, const char* matrix_name, std::size_t parameters) {
+    const auto array = root.read<double>(matrix_name, {std::nullopt, std::nullopt});
+    if (array.shape != hdf5::Shape{0, 0} && array.shape != hdf5::Shape{parameters, parameters})
+        root.refuse(matrix_name, std::to_string(array.shape[0]) + " x " + std::to_string(array.shape[1]),
+                    "must have a row and a column for each parameter, or be empty");
+    return Eigen::Map<const RowMajorMatrix>(array.values.data(), static_cast<Eigen::Index>(array.shape[0]),
+                                            static_cast<Eigen::Index>(array.shape[1]));
+}
+
+// ---- runs and residuals
+
+void write_runs(Group& root, const std::vector<FitRun>& runs, std::size_t parameters) {
+    Group group = root.make_group("runs", "every forward run of the fit; the table `runs`");
+    std::vector<double> values;
+    for (const FitRun& run : runs)
+        values.insert(values.end(), run.parameters.begin(), run.parameters.end());
+    group.write("parameters", values, {runs.size(), parameters}, {parameter_units, "a row a run, a column a parameter"});
+    group.write("misfit", column_of(runs, &FitRun::misfit),
+                {"1", "sum of squared weighted residuals; infinite when the run failed"});
+    group.write_texts("status", column_of(runs, &FitRun::status), "how the run ended");
+    group.write("seconds", column_of(runs, &FitRun::seconds), {"s", "wall time of the run"});
+}
+
+std::vector<FitRun> read_runs(const Group& group, std::size_t parameters) {
+    const auto [shape, values] = group.read<double>("parameters", {std::nullopt, parameters});
+    std::vector<FitRun> runs(shape.front());
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const double* first = values.data() + i * parameters;
+        runs[i].parameters.assign(first, first + parameters);
+    }
+    fill_column(runs, &FitRun::misfit, group.read_column<double>("misfit", runs.size()));
+    fill_column(runs, &FitRun::status, group.read_texts("status", runs.size()));
+    fill_column(runs, &FitRun::seconds, group.read_column<double>("seconds", runs.size()));
+    return runs;
+}
+
+struct ResidualColumn {
+    const char* name;
+    double FitResidual::*value;
+    const char* units;
+    const char* description;
+};
+
+constexpr ResidualColumn residual_numbers[] = {
+    {"at", &FitResidual::at, "m", "displacement for a force, crack length for an arrival"},
+    {"measured", &FitResidual::measured, residual_units, "what the test gave"},
+    {"modelled", &FitResidual::modelled, residual_units, "what the model gives at the best parameters"},
+    {"sigma", &FitResidual::sigma, residual_units, "standard deviation of the measurement"},
+    {"residual", &FitResidual::residual, "1", "(modelled - measured) / sigma"},
+};
+
+void write_residuals(Group& root, const std::vector<FitResidual>& residuals) {
+    Group group = root.make_group("residuals", "data against model; the table `residuals`");
+    group.write_texts("experiment", column_of(residuals, &FitResidual::experiment), "name of the experiment");
+    group.write_texts("kind", column_of(residuals, &FitResidual::kind), "force or arrival");
+    for (const ResidualColumn& column : residual_numbers)
+        group.write(column.name, column_of(residuals, column.value), {column.units, column.description});
+}
+
+std::vector<FitResidual> read_residuals(const Group& group) {
+    std::vector<FitResidual> residuals(group.read_texts("experiment").size());
+    fill_column(residuals, &FitResidual::experiment, group.read_texts("experiment", residuals.size()));
+    fill_column(residuals, &FitResidual::kind, group.read_texts("kind", residuals.size()));
+    for (const ResidualColumn& column : residual_numbers)
+        fill_column(residuals, column.value, group.read_column<double>(column.name, residuals.size()));
+    return residuals;
+}
+
+FitStatus read_status(const Group& root) {
+    const std::string text = root.read_text("status");
+    for (const FitStatus status : {FitStatus::converged, FitStatus::run_limit, FitStatus::interrupted, FitStatus::failed})
+        if (text == name(status))
+            return status;
+    root.refuse("status", text, "must be converged, run limit, interrupted or failed");
+}
+
+unsigned read_seed(const Group& root) {
+    const std::int64_t seed = root.read_number<std::int64_t>("seed");
+    if (seed < 0 || seed > std::numeric_limits<unsigned>::max())
+        root.refuse("seed", std::to_string(seed), "must fit into 32 bits without sign");
+    return static_cast<unsigned>(seed);
+}
+
+} // namespace
+
+void write(const Fit& fit, const std::filesystem::path& file) {
+    hdf5::save(file, "fit", [&](Group& root) {
+        root.write_text("status", name(fit.status), "how the fit ended");
+        root.write_text("message", fit.message, "why the fit ended");
+        root.write_text("method", fit.method, "what did the work, and why it was chosen");
+        root.write_text("study_text", fit.study_text, "the study in TOML as it was used");
+        root.write<std::int64_t>("seed", fit.seed, {"1", "of everything that was drawn at random"});
+        root.write("misfit", fit.misfit, {"1", "sum of squared weighted residuals at the best parameters"});
+        root.write("reduced_chi_square", fit.reduced_chi_square, {"1", "misfit for each degree of freedom"});
+        root.write("seconds", fit.seconds, {"s", "wall time of the fit"});
+        write_parameters(root, fit.parameters);
+        write_matrix(root, "covariance", fit.covariance,
+                     {"products of parameters/unit", "covariance of the parameters, in their order"});
+        write_matrix(root, "correlation", fit.correlation, {"1", "correlation of the parameters, in their order"});
+        write_runs(root, fit.runs, fit.parameters.size());
+        write_residuals(root, fit.residuals);
+    });
+}
+
+Fit read_fit(const std::filesystem::path& file) {
+    const Group root = hdf5::open(file, "fit");
+    Fit fit;
+    fit.status = read_status(root);
+    fit.message = root.read_text("message");
+    fit.method = root.read_text("method");
+    fit.study_text = root.read_text("study_text");
+    fit.seed = read_seed(root);
+    fit.misfit = root.read_number<double>("misfit");
+    fit.reduced_chi_square = root.read_number<double>("reduced_chi_square");
+    fit.seconds = root.read_number<double>("seconds");
+    fit.parameters = read_parameters(root.group("parameters"));
+    fit.covariance = read_matrix(root, "covariance", fit.parameters.size());
+    fit.correlation = read_matrix(root, "correlation", fit.parameters.size());
+    fit.runs = read_runs(root.group("runs"), fit.parameters.size());
+    fit.residuals = read_residuals(root.group("residuals"));
+    return fit;
+}
+
+} // namespace crampfit

@@ -1,0 +1,56 @@
+#pragma once
+
+#include "datasets/units.hpp"
+
+#include <limits>
+
+namespace crampfit {
+
+/// What a number may be, in SI. The same rules hold for a file, for the command line and for a fit.
+struct NumberRule {
+    Dimension dimension;
+    double low;
+    double high;
+    bool open;         // low and high themselves are not allowed
+    const char* rule;  // in words
+
+    bool allows(double value) const { return open ? value > low && value < high : value >= low && value <= high; }
+};
+
+namespace limits {
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
+
+constexpr NumberRule positive(const Dimension& dimension) {
+    return {dimension, 0, infinity, true, "must be greater than 0"};
+}
+constexpr NumberRule not_negative(const Dimension& dimension) {
+    return {dimension, 0, std::numeric_limits<double>::max(), false, "must not be negative"};
+}
+constexpr NumberRule finite(const Dimension& dimension) {
+    return {dimension, -infinity, infinity, true, "must be finite"};
+}
+
+inline constexpr NumberRule thickness = positive(dimension::length);
+inline constexpr NumberRule cell = positive(dimension::length);
+inline constexpr NumberRule size = positive(dimension::length);
+inline constexpr NumberRule radius = positive(dimension::length);
+inline constexpr NumberRule coordinate = finite(dimension::length);
+inline constexpr NumberRule pixel = positive(dimension::length);
+inline constexpr NumberRule rotation = finite(dimension::angle);
+inline constexpr NumberRule period = positive(dimension::length);
+inline constexpr NumberRule latewood_fraction{dimension::number, 0, 1, false, "must lie between 0 and 1"};
+inline constexpr NumberRule transition = not_negative(dimension::length);
+inline constexpr NumberRule youngs_modulus = positive(dimension::pressure);
+inline constexpr NumberRule poisson_ratio{dimension::number, -1, 0.5, true,
+                                          "must lie between -1 and 0.5, both excluded"};
+inline constexpr NumberRule density = positive(dimension::density);
+inline constexpr NumberRule toughness = positive(dimension::energy_release_rate);
+inline constexpr NumberRule velocity = finite(dimension::velocity);
+inline constexpr NumberRule traction = finite(dimension::pressure);
+inline constexpr NumberRule until = positive(dimension::time);
+inline constexpr NumberRule friction = not_negative(dimension::number);
+inline constexpr NumberRule advance = not_negative(dimension::length);
+inline constexpr NumberRule damping = not_negative(dimension::rate);
+}  // namespace limits
+
+}  // namespace crampfit

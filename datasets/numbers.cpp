@@ -1,0 +1,192 @@
+#include "datasets/numbers.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "datasets/keys.hpp"
+#include "datasets/scene_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace crampfit {
+namespace {
+
+/// Walks one key through a scene.
+class NumberFinder {
+  public:
+    NumberFinder(const Scene& scene, const std::string& key, const std::string& file, const std::string& value)
+        : scene_(scene), key_(key), file_(file), value_(value), parts_(split_key(key, file, value)) {}
+
+    SceneNumber find() const {
+        const std::map<std::string, std::function<SceneNumber()>> sections{
+            {"model",
+             [&] {
+                 return member({{"thickness", {&scene_.model.thickness, limits::thickness}}}, 1);
+             }},
+            {"materials", [&] { return in_material(); }},
+            {"specimen", [&] { return in_specimen(); }},
+            {"cracks", [&] { return in_crack(); }},
+            {"solver",
+             [&] {
+                 return member({{"damping", {&scene_.solver.damping, limits::damping}}}, 1);
+             }},
+            {"edges", [&] { return in_edge(); }},
+            {"bodies", [&] { return in_body(); }},
+        };
+        const auto section = sections.find(parts_[0]);
+        if (section == sections.end()) {
+            fail(suggestion(parts_[0], names_of(sections)));
+        }
+        return section->second();
+    }
+
+  private:
+    [[noreturn]] void fail(const std::string& reason) const {
+        throw InputError(file_, key_, value_, "is no number of this scene that can be adjusted" + reason);
+    }
+
+    template <class Map> static std::vector<std::string> names_of(const Map& map) {
+        std::vector<std::string> names;
+        for (const auto& [name, value] : map) {
+            names.push_back(name);
+        }
+        return names;
+    }
+
+    const std::string& part(std::size_t i) const {
+        if (i >= parts_.size()) {
+            fail(": the key ends too early");
+        }
+        return parts_[i];
+    }
+
+    /// The member that the last part, number `at`, names.
+    SceneNumber member(const std::map<std::string, SceneNumber>& members, std::size_t at) const {
+        const auto found = members.find(part(at));
+        if (found == members.end()) {
+            fail(suggestion(part(at), names_of(members)));
+        }
+        if (at + 1 != parts_.size()) {
+            fail(": the key goes too far");
+        }
+        return found->second;
+    }
+
+    SceneNumber in_material() const {
+        const auto material = scene_.materials.find(part(1));
+        if (material == scene_.materials.end()) {
+            fail(fmt::format(": there is no material {}{}", part(1), suggestion(part(1), names_of(scene_.materials))));
+        }
+        const IsotropicMaterial& m = material->second;
+        return member({{"E", {&m.youngs_modulus, limits::youngs_modulus}},
+                       {"nu", {&m.poisson_ratio, limits::poisson_ratio}},
+                       {"density", {&m.density, limits::density}},
+                       {"toughness", {&m.toughness, limits::toughness}}},
+                      2);
+    }
+
+    SceneNumber in_specimen() const {
+        if (part(1) == "rings") {
+            if (!scene_.specimen.rings) {
+                fail(": the specimen has no rings");
+            }
+            const Rings& rings = *scene_.specimen.rings;
+            return member({{"period", {&rings.period, limits::period}},
+                           {"latewood_fraction", {&rings.latewood_fraction, limits::latewood_fraction}},
+                           {"transition", {&rings.transition, limits::transition}}},
+                          2);
+        }
+        if (part(1) == "rotation" && !scene_.specimen.picture && scene_.specimen.file.empty()) {
+            fail(": the specimen has neither image nor file");
+        }
+        const SpecimenPlan& plan = scene_.specimen;
+        return member({{"rotation", {plan.picture ? &plan.picture->rotation : &plan.file_rotation, limits::rotation}}},
+                      1);
+    }
+
+    SceneNumber in_crack() const {
+        const std::size_t number = member_number(part(1), scene_.cracks.size());
+        if (number == scene_.cracks.size()) {
+            fail(fmt::format(": there is no crack {}; cracks are numbered from 0", part(1)));
+        }
+        return member({{"advance", {&scene_.cracks[number].advance, limits::advance}}}, 2);
+    }
+
+    template <class Member> const Member& named(const std::vector<Member>& list) const {
+        for (const Member& candidate : list) {
+            if (candidate.name == part(1)) {
+                return candidate;
+            }
+        }
+        const std::size_t number = member_number(part(1), list.size());
+        if (number == list.size()) {
+            fail(fmt::format(": there is no \"{}\" in {}", part(1), parts_[0]));
+        }
+        return list[number];
+    }
+
+    /// Number 0 or 1 of a velocity, the last part of the key.
+    SceneNumber velocity(const double* x, const double* y) const {
+        if (part(2) != "velocity") {
+            fail(suggestion(part(2), {"velocity"}));
+        }
+        const SceneNumber number = member({{"0", {x, limits::velocity}}, {"1", {y, limits::velocity}}}, 3);
+        if (number.value == nullptr) {
+            fail(": this component is free");
+        }
+        return number;
+    }
+
+    SceneNumber in_edge() const {
+        const auto& [x, y] = named(scene_.edges).velocity;
+        return velocity(x ? &*x : nullptr, y ? &*y : nullptr);
+    }
+
+    SceneNumber in_body() const {
+        const Vec2& v = named(scene_.bodies).velocity;
+        return velocity(&v.x(), &v.y());
+    }
+
+    const Scene& scene_;
+    const std::string& key_;
+    const std::string& file_;
+    const std::string& value_;
+    std::vector<std::string> parts_;
+};
+
+}  // namespace
+
+SceneNumber find_number(const Scene& scene, const std::string& key, const std::string& file, const std::string& value) {
+    return NumberFinder(scene, key, file, value).find();
+}
+
+double get_number(const Scene& scene, const std::string& key) {
+    return *find_number(scene, key, scene.file.string(), "(any)").value;
+}
+
+void set_number(Scene& scene, const std::string& key, double value) {
+    const std::string file = scene.file.string();
+    const std::string text = fmt::format("{}", value);
+    const SceneNumber number = find_number(scene, key, file, text);
+    if (!number.rule.allows(value)) {
+        throw InputError(file, key, text, number.rule.rule);
+    }
+    double& slot =
+        const_cast<double&>(*number.value);  // the scene is ours to change; finding needs no second, mutable copy
+    const double before = std::exchange(slot, value);
+    if (scene.specimen.rings) {
+        try {
+            check_rings(*scene.specimen.rings, {file, key}, text);
+        } catch (const InputError&) {
+            slot = before;
+            throw;
+        }
+    }
+}
+
+}  // namespace crampfit

@@ -1,0 +1,171 @@
+#pragma once
+
+#include "datasets/specimen.hpp"
+
+#include <Eigen/Core>
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace crampfit {
+
+using Vec2 = Eigen::Vector2d;
+
+struct Circle {
+    Vec2 centre;    // [m]
+    double radius;  // [m]
+};
+
+struct Polygon {
+    std::vector<Vec2> points;  // [m], at least three, either sense, closed by itself
+};
+
+using Shape = std::variant<Polygon, Circle>;
+
+enum class PlaneCondition { strain, stress };
+
+struct Model {
+    PlaneCondition plane = PlaneCondition::strain;
+    double thickness = 0.0;      // [m]
+    double cell = 0.0;           // grid spacing [m]
+    int points_per_cell = 4;     // a square number: 1, 4, 9, 16
+};
+
+/// Growth rings from geometry: with r the distance to the pith, LW where frac(r / period) > 1 - latewood_fraction.
+/// Over `transition` before that, density goes linearly from EW to LW and the other properties follow the density.
+struct Rings {
+    Vec2 pith;                    // [m]
+    double period = 0.0;          // [m]
+    double latewood_fraction = 0; // 0..1
+    double transition = 0.0;      // [m]
+};
+
+struct GrayClass {
+    std::string material;
+    int low = 0;   // 0..255, inclusive
+    int high = 0;  // 0..255, inclusive
+};
+
+/// A picture that becomes the specimen's material, and how it lies in the specimen.
+struct Picture {
+    std::filesystem::path file;         // resolved against the scene's folder
+    double pixel = 0.0;                 // [m]
+    Vec2 offset = Vec2::Zero();         // the picture's lower left corner in the specimen [m]
+    double rotation = 0.0;              // turns the picture about that corner, counter-clockwise [rad]
+    std::vector<GrayClass> classes;
+    bool graded = false;                // key `between = "graded"`: grays between two classes' ranges are transition wood
+    std::filesystem::path orientation;  // optional second picture; empty: none
+};
+
+struct SpecimenPlan {
+    Vec2 size = Vec2::Zero();        // lower left corner at the origin [m]
+    std::vector<Shape> cutouts;
+    std::string material;            // one of `material`, `rings`, `picture`, `file` is set
+    std::optional<Rings> rings;
+    std::optional<Picture> picture;
+    std::filesystem::path file;      // a Specimen in HDF5; uses picture_offset and picture_rotation below
+    Vec2 file_offset = Vec2::Zero(); // [m]
+    double file_rotation = 0.0;      // [rad]
+    std::shared_ptr<const Specimen> map;  // what `picture` or `file` holds, once it has been read
+};
+
+struct IsotropicMaterial {
+    double youngs_modulus = 0.0;  // E [Pa]
+    double poisson_ratio = 0.0;   // nu, -1 < nu < 0.5
+    double density = 0.0;         // rho [kg/m^3]
+    double toughness = 0.0;       // G_c [J/m^2]
+};
+
+enum class Side { top, bottom, left, right };
+
+/// A condition on a straight side of the specimen's rectangle.
+struct Edge {
+    std::string name;
+    Side side = Side::top;
+    std::optional<std::pair<double, double>> range;          // by x or y [m]; absent: the whole side
+    std::array<std::optional<double>, 2> velocity;           // [m/s]; absent component: free
+    std::optional<Vec2> traction;                            // [Pa]; excludes velocity
+    std::optional<double> until;                             // moves until then, then holds still [s]
+};
+
+struct Contact {
+    enum class Kind { frictionless, bonded, friction } kind = Kind::frictionless;
+    double coefficient = 0.0;  // Coulomb friction
+};
+
+/// A rigid body.
+struct Body {
+    std::string name;
+    Shape shape;
+    Contact contact;
+    Vec2 velocity = Vec2::Zero();  // [m/s]
+    std::optional<double> until;   // moves until then, then holds still [s]
+};
+
+enum class Growth { none, start, end, both };
+enum class GrowthDirection { normal_to_opening, hoop_stress, energy_release_rate, straight };
+
+struct CrackFaces {
+    enum class Kind { frictionless, stick, friction } kind = Kind::frictionless;
+    double coefficient = 0.0;
+};
+
+struct Crack {
+    std::vector<Vec2> points;  // [m], at least two
+    Growth grows = Growth::none;
+    double advance = 0.0;      // material length over which energy is balanced [m]
+    GrowthDirection direction = GrowthDirection::normal_to_opening;
+    CrackFaces faces;
+};
+
+struct Measure {
+    std::string force;         // an edge or a body
+    std::string displacement;  // an edge or a body
+};
+
+enum class SolverKind { automatic, explicit_dynamics, quasistatic };
+enum class ShapeFunction { automatic, linear, gimp, bspline2, cpdi };
+
+struct SolverChoice {
+    SolverKind kind = SolverKind::automatic;
+    ShapeFunction shape_function = ShapeFunction::automatic;
+    double damping = 0.0;   // mass-proportional, force = -damping * mass * velocity [1/s]
+};
+
+/// Whichever comes first; at least one is set.
+struct Stop {
+    std::optional<double> displacement;  // [m]
+    std::optional<double> crack_length;  // [m]
+    std::optional<double> time;          // [s]
+};
+
+struct Output {
+    int frames = 0;      // pictures of the points
+    int samples = 1000;  // rows of the series at most, about
+};
+
+/// Everything that a forward run needs. SI inside; checked by `read_scene` before anything runs.
+struct Scene {
+    std::string title;
+    Model model;
+    SpecimenPlan specimen;
+    std::map<std::string, IsotropicMaterial> materials;
+    std::vector<Edge> edges;
+    std::vector<Body> bodies;
+    std::vector<Crack> cracks;
+    Measure measure;
+    SolverChoice solver;
+    Stop stop;
+    Output output;
+
+    std::filesystem::path file;  // where it was read from
+    std::string text;            // the TOML as it was used, overrides applied
+};
+
+} // namespace crampfit

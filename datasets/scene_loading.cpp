@@ -1,0 +1,179 @@
+#include "datasets/scene_geometry.hpp"
+#include "datasets/scene_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+namespace crampfit {
+namespace {
+
+/// A word, or the table { friction = 0.3 }: how two surfaces meet.
+template <class Meeting> Meeting read_meeting(const Entry& entry, const Choices<typename Meeting::Kind>& words) {
+    Meeting meeting;
+    if (entry.is_table()) {
+        entry.only({"friction"});
+        meeting.kind = Meeting::Kind::friction;
+        meeting.coefficient = entry.at("friction").number(limits::friction);
+    } else {
+        meeting.kind = entry.choice(words);
+    }
+    return meeting;
+}
+
+bool is_free(const Entry& component) { return component.is_text() && component.text() == "free"; }
+
+std::vector<Entry> velocity_components(const Entry& velocity) {
+    return velocity.list(2, "two velocities, such as [\"0 m/s\", \"1 mm/min\"]");
+}
+
+std::pair<double, double> read_range(const Entry& entry, double side_length) {
+    const std::vector<Entry> ends = entry.list(2, "two lengths, such as [\"4 mm\", \"6 mm\"]");
+    const double low = ends[0].number(limits::coordinate);
+    const double high = ends[1].number(limits::coordinate);
+    if (!(low < high)) {
+        entry.fail("the range is reversed or empty: write the lower end first");
+    }
+    constexpr double rounding = 1e-12;  // of decimals
+    if (low < 0 || high > side_length * (1 + rounding)) {
+        entry.fail(fmt::format("the range must lie on the side, from 0 to {:g} mm", 1e3 * side_length));
+    }
+    return {low, high};
+}
+
+Edge read_edge(const Entry& entry, const Vec2& specimen_size) {
+    entry.only({"name", "side", "range", "velocity", "traction", "until"});
+    Edge edge;
+    const Entry side = entry.at("side");
+    edge.side =
+        side.choice<Side>({{"top", Side::top}, {"bottom", Side::bottom}, {"left", Side::left}, {"right", Side::right}});
+    const auto name = entry.find("name");
+    edge.name = name ? name->text() : side.text();
+    if (const auto range = entry.find("range")) {
+        const bool along_x = edge.side == Side::top || edge.side == Side::bottom;
+        edge.range = read_range(*range, along_x ? specimen_size.x() : specimen_size.y());
+    }
+    if (entry.has("velocity") == entry.has("traction")) {
+        entry.fail("give one of velocity and traction");
+    }
+    if (const auto traction = entry.find("traction")) {
+        const std::vector<Entry> components = traction->list(2, "two pressures, such as [\"0 MPa\", \"1 MPa\"]");
+        edge.traction = Vec2(components[0].number(limits::traction), components[1].number(limits::traction));
+    } else {
+        const std::vector<Entry> components = velocity_components(entry.at("velocity"));
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+            if (!is_free(components[axis])) {
+                edge.velocity[axis] = components[axis].number(limits::velocity);
+            }
+        }
+    }
+    if (const auto until = entry.find("until")) {
+        if (edge.traction) {
+            until->fail("belongs to a velocity: an edge with a traction has none");
+        }
+        edge.until = until->number(limits::until);
+    }
+    return edge;
+}
+
+Body read_body(const Entry& entry, std::size_t number) {
+    entry.only({"name", "circle", "polygon", "contact", "velocity", "force", "until"});
+    Body body;
+    const auto name = entry.find("name");
+    body.name = name ? name->text() : fmt::format("body {}", number);
+    body.shape = read_shape(entry);
+    if (const auto contact = entry.find("contact")) {
+        body.contact = read_meeting<Contact>(
+            *contact, {{"frictionless", Contact::Kind::frictionless}, {"bonded", Contact::Kind::bonded}});
+    }
+    if (const auto force = entry.find("force")) {
+        force->fail("a body under a force is not supported yet");
+    }
+    const std::vector<Entry> components = velocity_components(entry.at("velocity"));
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+        if (is_free(components[axis])) {
+            components[axis].fail("a body with a free component is not supported yet");
+        }
+        body.velocity[static_cast<Eigen::Index>(axis)] = components[axis].number(limits::velocity);
+    }
+    if (const auto until = entry.find("until")) {
+        body.until = until->number(limits::until);
+    }
+    return body;
+}
+
+std::vector<Vec2> read_crack_points(const Entry& entry, const Vec2& specimen_size) {
+    std::vector<Vec2> points;
+    for (const Entry& point : entry.list()) {
+        points.push_back(point.point());
+    }
+    if (points.size() < 2) {
+        entry.fail("a crack has at least 2 points");
+    }
+    if (const std::size_t i = repeated_point(points, false); i < points.size()) {
+        entry.fail(fmt::format("point {} repeats the one before it: a segment of the crack has no length", i));
+    }
+    if (crosses_itself(points, false)) {
+        entry.fail("a crack must not cross or touch itself");
+    }
+    if (!meets_rectangle(points, specimen_size)) {
+        entry.fail("the crack lies outside the specimen");
+    }
+    return points;
+}
+
+Crack read_crack(const Entry& entry, const Vec2& specimen_size) {
+    entry.only({"points", "grows", "criterion", "advance", "direction", "faces"});
+    Crack crack;
+    crack.points = read_crack_points(entry.at("points"), specimen_size);
+    if (const auto grows = entry.find("grows")) {
+        crack.grows = grows->choice<Growth>(
+            {{"none", Growth::none}, {"start", Growth::start}, {"end", Growth::end}, {"both", Growth::both}});
+    }
+    if (const auto criterion = entry.find("criterion")) {
+        criterion->choice<bool>({{"energy release rate", true}});
+    }
+    if (const auto advance = entry.find("advance")) {
+        crack.advance = advance->number(limits::advance);
+    }
+    if (const auto direction = entry.find("direction")) {
+        crack.direction =
+            direction->choice<GrowthDirection>({{"normal to opening", GrowthDirection::normal_to_opening},
+                                                {"hoop stress", GrowthDirection::hoop_stress},
+                                                {"energy release rate", GrowthDirection::energy_release_rate},
+                                                {"straight", GrowthDirection::straight}});
+    }
+    if (const auto faces = entry.find("faces")) {
+        crack.faces = read_meeting<CrackFaces>(
+            *faces, {{"frictionless", CrackFaces::Kind::frictionless}, {"stick", CrackFaces::Kind::stick}});
+    }
+    return crack;
+}
+
+}  // namespace
+
+std::vector<Edge> read_edges(const Entry& edges, const Vec2& specimen_size) {
+    std::vector<Edge> result;
+    for (const Entry& edge : edges.list()) {
+        result.push_back(read_edge(edge, specimen_size));
+    }
+    return result;
+}
+
+std::vector<Body> read_bodies(const Entry& bodies) {
+    std::vector<Body> result;
+    for (const Entry& body : bodies.list()) {
+        result.push_back(read_body(body, result.size()));
+    }
+    return result;
+}
+
+std::vector<Crack> read_cracks(const Entry& cracks, const Vec2& specimen_size) {
+    std::vector<Crack> result;
+    for (const Entry& crack : cracks.list()) {
+        result.push_back(read_crack(crack, specimen_size));
+    }
+    return result;
+}
+
+}  // namespace crampfit

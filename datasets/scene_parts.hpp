@@ -1,0 +1,30 @@
+#pragma once
+
+#include "datasets/scene.hpp"
+#include "datasets/toml_reader.hpp"
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+// The sections of a scene, one reader each. All throw InputError.
+
+Model read_model(const Entry& model);
+std::map<std::string, IsotropicMaterial> read_materials(const Entry& materials);
+SpecimenPlan read_specimen_plan(const Entry& specimen, const std::map<std::string, IsotropicMaterial>& materials);
+std::vector<Edge> read_edges(const Entry& edges, const Vec2& specimen_size);
+std::vector<Body> read_bodies(const Entry& bodies);
+std::vector<Crack> read_cracks(const Entry& cracks, const Vec2& specimen_size);
+SolverChoice read_solver(const Entry& solver);
+Stop read_stop(const Entry& stop);
+Output read_output(const Entry& output);
+
+/// A circle or a polygon, from a table that has one of these two keys (among others).
+Shape read_shape(const Entry& parent);
+
+/// Throws InputError when latewood and transition together are longer than a ring.
+void check_rings(const Rings& rings, const Place& place, const std::string& value);
+
+}  // namespace crampfit

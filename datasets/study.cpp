@@ -1,0 +1,152 @@
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "datasets/study_parts.hpp"
+#include "datasets/text_file.hpp"
+#include "datasets/toml_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+namespace crampfit {
+namespace {
+
+const std::vector<std::string> study_keys{"title", "experiments", "parameters", "optimizer", "uncertainty"};
+
+/// Keys of a study for the sensitivity verb.
+const std::array<const char*, 3> sensitivity_keys{"sensitivity", "outputs", "scene"};
+
+/// What --set gives, for the study itself and for all its scenes.
+struct SplitOverrides {
+    Overrides study;
+    Overrides scenes;
+};
+
+SplitOverrides split_overrides(const Overrides& overrides) {
+    SplitOverrides split;
+    for (const auto& [key, value] : overrides) {
+        const std::string section = split_key(key, command_line, value).front();
+        const bool of_study =
+            std::find(study_keys.begin(), study_keys.end(), section) != study_keys.end() ||
+            std::find(sensitivity_keys.begin(), sensitivity_keys.end(), section) != sensitivity_keys.end();
+        (of_study ? split.study : split.scenes).emplace_back(key, value);
+    }
+    return split;
+}
+
+Noise read_noise(const Entry& entry, const Curves& data) {
+    entry.only({"force", "crack_length", "displacement", "time"});
+    const auto sigma = [&](const char* name, const Dimension& dimension, const std::vector<double>& column) {
+        const auto found = entry.find(name);
+        if (!found) {
+            return std::optional<double>();
+        }
+        if (column.empty()) {
+            found->fail("the data have no such column");
+        }
+        return std::optional(found->number(limits::positive(dimension)));
+    };
+    return {sigma("force", dimension::force, data.force), sigma("crack_length", dimension::length, data.crack_length),
+            sigma("displacement", dimension::length, data.displacement), sigma("time", dimension::time, data.time)};
+}
+
+Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
+    entry.only({"name", "scene", "data", "noise", "weight"});
+    Experiment experiment;
+    const auto name = entry.find("name");
+    experiment.name = name ? name->text() : fmt::format("experiment {}", number);
+    experiment.scene = read_scene(entry.at("scene").existing_file(), scene_overrides);
+    experiment.data_file = entry.at("data").existing_file();
+    experiment.data = read_curves(experiment.data_file);
+    if (const auto noise = entry.find("noise")) {
+        experiment.noise = read_noise(*noise, experiment.data);
+    }
+    if (const auto weight = entry.find("weight")) {
+        experiment.weight = weight->number(limits::positive(dimension::number));
+    }
+    return experiment;
+}
+
+std::vector<Experiment> read_experiments(const Entry& list, const Overrides& scene_overrides) {
+    std::vector<Experiment> experiments;
+    for (const Entry& entry : list.list()) {
+        experiments.push_back(read_experiment(entry, experiments.size(), scene_overrides));
+        for (std::size_t i = 0; i + 1 < experiments.size(); ++i) {
+            if (experiments[i].name == experiments.back().name) {
+                entry.fail(fmt::format("the name \"{}\" is taken: each experiment needs a name of its own",
+                                       experiments[i].name));
+            }
+        }
+    }
+    if (experiments.empty()) {
+        list.fail("at least one experiment is needed");
+    }
+    return experiments;
+}
+
+OptimizerChoice read_optimizer(const Entry& entry) {
+    constexpr int most_starts = 10'000;
+    constexpr int most_runs = 100'000'000;
+    entry.only({"method", "starts", "max_runs"});
+    OptimizerChoice optimizer;
+    if (const auto method = entry.find("method")) {
+        Choices<std::string> choices;
+        for (const char* known :
+             {"auto", "ceres", "bobyqa", "sbplx", "cobyla", "neldermead", "crs2", "isres", "direct", "mlsl"}) {
+            choices.emplace_back(known, known);
+        }
+        optimizer.method = method->choice(choices);
+    }
+    if (const auto starts = entry.find("starts")) {
+        optimizer.starts = starts->integer(1, most_starts);
+    }
+    if (const auto runs = entry.find("max_runs")) {
+        optimizer.max_runs = runs->integer(1, most_runs);
+    }
+    return optimizer;
+}
+
+UncertaintyChoice read_uncertainty(const Entry& entry) {
+    constexpr int most_samples = 100'000'000;
+    entry.only({"profile", "posterior"});
+    UncertaintyChoice uncertainty;
+    if (const auto profile = entry.find("profile")) {
+        uncertainty.profile = profile->boolean();
+    }
+    if (const auto posterior = entry.find("posterior")) {
+        uncertainty.posterior = posterior->integer(0, most_samples);
+    }
+    return uncertainty;
+}
+
+}  // namespace
+
+Study read_study(const std::filesystem::path& file, const Overrides& overrides) {
+    const SplitOverrides split = split_overrides(overrides);
+    const Document document(read_text(file), file, split.study);
+    const Entry root = document.root();
+    for (const char* key : sensitivity_keys) {
+        if (const auto entry = root.find(key)) {
+            entry->fail("a sensitivity study is not supported yet");
+        }
+    }
+    root.only(study_keys);
+    Study study;
+    study.file = file;
+    study.text = document.text();
+    if (const auto title = root.find("title")) {
+        study.title = title->text();
+    }
+    study.experiments = read_experiments(root.at("experiments"), split.scenes);
+    study.parameters = read_parameters(root.at("parameters"), study.experiments);
+    if (const auto optimizer = root.find("optimizer")) {
+        study.optimizer = read_optimizer(*optimizer);
+    }
+    if (const auto uncertainty = root.find("uncertainty")) {
+        study.uncertainty = read_uncertainty(*uncertainty);
+    }
+    return study;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,131 @@
+#include "datasets/error.hpp"
+#include "datasets/numbers.hpp"
+#include "datasets/study_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+/// The rule of the number that `key` leads to in at least one of the scenes.
+NumberRule find_rule(const Entry& entry, const std::string& key, const std::vector<Experiment>& experiments) {
+    std::string reason;
+    for (const Experiment& experiment : experiments) {
+        try {
+            return find_number(experiment.scene, key, "", "").rule;
+        } catch (const InputError& error) {
+            reason = error.rule;
+        }
+    }
+    entry.fail(fmt::format("{} {}", key, reason));
+}
+
+std::vector<Entry> key_entries(const Entry& parameter) {
+    if (parameter.has("key") == parameter.has("keys")) {
+        parameter.fail("give one of key and keys");
+    }
+    if (parameter.has("key")) {
+        return {parameter.at("key")};
+    }
+    const std::vector<Entry> entries = parameter.at("keys").list();
+    if (entries.empty()) {
+        parameter.at("keys").fail("at least one key is needed");
+    }
+    return entries;
+}
+
+/// Fills in the keys and returns the rule of each.
+std::vector<NumberRule> read_keys(const Entry& entry, const std::vector<Experiment>& experiments,
+                                  Parameter& parameter) {
+    std::vector<NumberRule> rules;
+    for (const Entry& key : key_entries(entry)) {
+        rules.push_back(find_rule(key, key.text(), experiments));
+        if (!(rules.back().dimension == rules.front().dimension)) {
+            key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}",
+                                 describe(rules.back().dimension), describe(rules.front().dimension)));
+        }
+        parameter.keys.push_back(key.text());
+    }
+    return rules;
+}
+
+/// A value that every one of the parameter's keys allows.
+double read_value(const Entry& entry, const std::vector<NumberRule>& rules) {
+    double value = 0;
+    for (const NumberRule& rule : rules) {
+        value = entry.number(rule);
+    }
+    return value;
+}
+
+std::optional<Prior> read_prior(const Entry& parameter, const Dimension& dimension) {
+    const auto entry = parameter.find("prior");
+    if (!entry) {
+        return std::nullopt;
+    }
+    entry->only({"mean", "sd"});
+    return Prior{entry->at("mean").number(limits::finite(dimension)),
+                 entry->at("sd").number(limits::positive(dimension))};
+}
+
+Parameter read_parameter(const Entry& entry, const std::vector<Experiment>& experiments) {
+    entry.only({"name", "key", "keys", "initial", "lower", "upper", "scale", "prior"});
+    Parameter parameter;
+    const std::vector<NumberRule> rules = read_keys(entry, experiments, parameter);
+    const auto name = entry.find("name");
+    parameter.name = name ? name->text() : parameter.keys.front();
+    parameter.initial = read_value(entry.at("initial"), rules);
+    parameter.lower = read_value(entry.at("lower"), rules);
+    parameter.upper = read_value(entry.at("upper"), rules);
+    const Quantity written = entry.at("initial").quantity();
+    parameter.unit = written.unit;
+    parameter.unit_factor = written.factor;
+    if (!(parameter.lower < parameter.upper)) {
+        entry.at("lower").fail("must be less than upper");
+    }
+    if (parameter.initial < parameter.lower || parameter.initial > parameter.upper) {
+        entry.at("initial").fail("must lie between lower and upper");
+    }
+    if (const auto scale = entry.find("scale")) {
+        parameter.scale = scale->choice<Scale>({{"linear", Scale::linear}, {"log", Scale::logarithmic}});
+        if (parameter.scale == Scale::logarithmic && !(parameter.lower > 0)) {
+            entry.at("lower").fail("must be greater than 0 on a log scale");
+        }
+    }
+    parameter.prior = read_prior(entry, rules.front().dimension);
+    return parameter;
+}
+
+/// A name or a key that another parameter has already.
+void check_unlike(const Entry& entry, const Parameter& parameter, const std::vector<Parameter>& others) {
+    for (const Parameter& other : others) {
+        if (other.name == parameter.name) {
+            entry.fail(fmt::format("the name \"{}\" is taken: each parameter needs a name of its own", other.name));
+        }
+        for (const std::string& key : other.keys) {
+            if (std::find(parameter.keys.begin(), parameter.keys.end(), key) != parameter.keys.end()) {
+                entry.fail(fmt::format("{} belongs to the parameter \"{}\" already", key, other.name));
+            }
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<Parameter> read_parameters(const Entry& list, const std::vector<Experiment>& experiments) {
+    std::vector<Parameter> parameters;
+    for (const Entry& entry : list.list()) {
+        const Parameter parameter = read_parameter(entry, experiments);
+        check_unlike(entry, parameter, parameters);
+        parameters.push_back(parameter);
+    }
+    if (parameters.empty()) {
+        list.fail("at least one parameter is needed");
+    }
+    return parameters;
+}
+
+}  // namespace crampfit

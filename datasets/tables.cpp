@@ -1,0 +1,195 @@
+#include "datasets/error.hpp"
+#include "datasets/hdf5.hpp"
+#include "datasets/io.hpp"
+#include "datasets/record_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <functional>
+#include <ostream>
+
+namespace crampfit {
+
+namespace {
+
+using Row = std::vector<std::string>;
+
+/// What is printed: the header, then the rest.
+using Table = std::vector<Row>;
+
+/// A table that a file has; made when it is asked for.
+struct Offer {
+    std::string name;
+    std::function<Table()> make;
+};
+
+/// The shortest text that reads back as the same bits.
+std::string text_of(double number) { return fmt::format("{}", number); }
+
+/// As in RFC 4180 (Shafranovich 2005), section 2, but a line ends with a line feed alone.
+std::string quoted_if_needed(const std::string& field) {
+    if (field.find_first_of(",\"\r\n") == std::string::npos)
+        return field;
+    std::string quoted = "\"";
+    for (const char character : field)
+        quoted += character == '"' ? "\"\"" : std::string(1, character);
+    return quoted + '"';
+}
+
+void print(const Table& table, std::ostream& out) {
+    for (const Row& row : table) {
+        const char* separator = "";
+        for (const std::string& field : row) {
+            out << separator << quoted_if_needed(field);
+            separator = ",";
+        }
+        out << '\n';
+    }
+}
+
+// ---- tables of a record
+
+Table series_table(const Record& record) {
+    Table table(1);
+    for (const SeriesColumn& column : series_columns)
+        table.front().push_back(column.header);
+    for (Instant instant : record.series) {
+        Row& row = table.emplace_back();
+        for (const SeriesColumn& column : series_columns)
+            row.push_back(text_of(column.value(instant)));
+    }
+    return table;
+}
+
+Table path_table(const std::vector<Vec2>& path) {
+    Table table{{"x_m", "y_m"}};
+    for (const Vec2& vertex : path)
+        table.push_back({text_of(vertex.x()), text_of(vertex.y())});
+    return table;
+}
+
+Table crack_table(const Record& record, const CrackHistory& crack) {
+    Table table{{"time_s", "displacement_m", "crack_length_m", "tip_x_m", "tip_y_m", "G_J_m2", "K_I_Pa_sqrt_m",
+                 "K_II_Pa_sqrt_m"}};
+    for (std::size_t i = 0; i < record.series.size(); ++i) {
+        const Instant& instant = record.series[i];
+        Row& row = table.emplace_back();
+        for (const double value : {instant.time, instant.displacement, crack.length[i], crack.tip[i].x(), crack.tip[i].y(),
+                                   crack.G[i], crack.K_I[i], crack.K_II[i]})
+            row.push_back(text_of(value));
+    }
+    return table;
+}
+
+Table reactions_table(const Record& record) {
+    Table table{{"time_s"}};
+    for (const ReactionHistory& reaction : record.reactions) {
+        table.front().push_back(reaction.name + "_x_N");
+        table.front().push_back(reaction.name + "_y_N");
+    }
+    for (std::size_t i = 0; i < record.series.size(); ++i) {
+        Row& row = table.emplace_back(Row{text_of(record.series[i].time)});
+        for (const ReactionHistory& reaction : record.reactions) {
+            row.push_back(text_of(reaction.force[i].x()));
+            row.push_back(text_of(reaction.force[i].y()));
+        }
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const Record& record) {
+    std::vector<Offer> offers{{"series", [&] { return series_table(record); }}};
+    // A specimen without a crack has no path.
+    if (const auto tracked = static_cast<std::size_t>(record.tracked_crack); tracked < record.paths.size())
+        offers.push_back({"path", [&record, tracked] { return path_table(record.paths[tracked]); }});
+    for (std::size_t i = 0; i < record.cracks.size(); ++i) {
+        offers.push_back({fmt::format("crack{}", i + 1), [&record, i] { return crack_table(record, record.cracks[i]); }});
+        offers.push_back({fmt::format("path{}", i + 1),
+                          [&record, i] { return path_table(record.paths.at(crack_number(record, i))); }});
+    }
+    offers.push_back({"reactions", [&] { return reactions_table(record); }});
+    return offers;
+}
+
+// ---- tables of a fit
+
+Table parameters_table(const Fit& fit) {
+    Table table{
+        {"name", "key", "value", "unit", "standard_error", "lower_95", "upper_95", "initial", "at_bound"}};
+    for (const FittedParameter& parameter : fit.parameters)
+        table.push_back({parameter.name, parameter.key, text_of(parameter.value), parameter.unit,
+                         text_of(parameter.standard_error), text_of(parameter.lower_95), text_of(parameter.upper_95),
+                         text_of(parameter.initial), parameter.at_bound ? "true" : "false"});
+    return table;
+}
+
+Table runs_table(const Fit& fit) {
+    Table table(1);
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    table.front().insert(table.front().end(), {"misfit", "status", "seconds"});
+    for (const FitRun& run : fit.runs) {
+        Row& row = table.emplace_back();
+        for (const double value : run.parameters)
+            row.push_back(text_of(value));
+        row.insert(row.end(), {text_of(run.misfit), run.status, text_of(run.seconds)});
+    }
+    return table;
+}
+
+Table residuals_table(const Fit& fit) {
+    Table table{{"experiment", "kind", "at", "measured", "modelled", "sigma", "residual"}};
+    for (const FitResidual& residual : fit.residuals)
+        table.push_back({residual.experiment, residual.kind, text_of(residual.at), text_of(residual.measured),
+                         text_of(residual.modelled), text_of(residual.sigma), text_of(residual.residual)});
+    return table;
+}
+
+Table correlation_table(const Fit& fit) {
+    Table table{{"parameter"}};
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    for (Eigen::Index i = 0; i < fit.correlation.rows(); ++i) {
+        Row& row = table.emplace_back(Row{fit.parameters[static_cast<std::size_t>(i)].name});
+        for (Eigen::Index j = 0; j < fit.correlation.cols(); ++j)
+            row.push_back(text_of(fit.correlation(i, j)));
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const Fit& fit) {
+    return {{"parameters", [&] { return parameters_table(fit); }},
+            {"runs", [&] { return runs_table(fit); }},
+            {"residuals", [&] { return residuals_table(fit); }},
+            {"correlation", [&] { return correlation_table(fit); }}};
+}
+
+void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
+                  std::ostream& out) {
+    std::vector<std::string> names;
+    for (const Offer& offer : offers) {
+        if (offer.name == wanted)
+            return print(offer.make(), out);
+        names.push_back(offer.name);
+    }
+    throw InputError(file.string(), "table", wanted,
+                     names.empty() ? "this file has no tables" : fmt::format("must be one of: {}", fmt::join(names, ", ")));
+}
+
+} // namespace
+
+void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out) {
+    const std::string kind = hdf5::open(file).attribute("kind");
+    if (kind == "record") {
+        const Record record = read_record_without_frames(file);
+        print_one_of(offers(record), file, table, out);
+    } else if (kind == "fit") {
+        const Fit fit = read_fit(file);
+        print_one_of(offers(fit), file, table, out);
+    } else {
+        print_one_of({}, file, table, out);
+    }
+}
+
+} // namespace crampfit

@@ -1,0 +1,28 @@
+#include "datasets/text_file.hpp"
+
+#include "datasets/error.hpp"
+
+#include <fstream>
+#include <sstream>
+
+namespace crampfit {
+
+std::string read_text(const std::filesystem::path& file) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) {
+        throw InputError(file.string(), "", "", "there is no such file");
+    }
+    std::ifstream in(file, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    if (!in) {
+        throw InputError(file.string(), "", "", "the file cannot be read");
+    }
+    std::string content = std::move(text).str();
+    if (content.starts_with("\xEF\xBB\xBF")) {
+        content.erase(0, 3);
+    }
+    return content;
+}
+
+}  // namespace crampfit

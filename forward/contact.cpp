@@ -1,0 +1,97 @@
+#include "forward/contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+namespace {
+
+constexpr int steps_between_searches = 50;
+constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
+
+// How deep x lies in the shape, and which way out. Nothing outside it.
+bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out) {
+    if (const auto* circle = std::get_if<Circle>(&shape)) {
+        const Vec2 arm = x - circle->centre;
+        const double reach = arm.norm();
+        if (reach >= circle->radius || reach == 0.0) return false;
+        depth = circle->radius - reach;
+        out = arm / reach;
+        return true;
+    }
+    if (!inside(shape, x)) return false;
+    const OutlinePoint on = nearest_on_outline(shape, x);
+    depth = on.distance;
+    out = on.normal;
+    return true;
+}
+
+} // namespace
+
+SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double most_frequency_squared)
+    : shape_(shape), body_(body) {
+    const Points& points = body.points;
+    std::vector<double> node_mass(body.layout.nodes(), 0.0);
+    for (int p = 0; p < points.count(); ++p)
+        for (int k = 0; k < 4; ++k) node_mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+    std::vector<double> node_stiffness(body.layout.nodes(), 0.0);
+    const double h = body.layout.cell.minCoeff();
+    for (const Facet& f : body.facets) {
+        stiffness_.push_back(points.stiffest(f.point) / h * f.length * body.layout.thickness);
+        for (int k = 0; k < 4; ++k) node_stiffness[points.node[f.point][k]] += stiffness_.back() * f.weight[k];
+    }
+    // A facet on a node with hardly any mass must not shorten the time step.
+    for (std::size_t i = 0; i < stiffness_.size(); ++i) {
+        const Facet& f = body.facets[i];
+        for (int k = 0; k < 4; ++k) {
+            const int n = points.node[f.point][k];
+            if (f.weight[k] > 0.0 && node_stiffness[n] > most_frequency_squared * node_mass[n])
+                stiffness_[i] = std::min(stiffness_[i], stiffness_[i] * most_frequency_squared * node_mass[n] / node_stiffness[n]);
+        }
+    }
+}
+
+Vec2 SlidingBody::current(const Facet& facet, const std::vector<Vec2>& displacement) const {
+    Vec2 x = facet.position;
+    for (int k = 0; k < 4; ++k) x += facet.weight[k] * displacement[body_.points.node[facet.point][k]];
+    return x;
+}
+
+void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displacement) {
+    const Box box = bounds(shape_);
+    const Vec2 margin = search_margin * body_.layout.cell;
+    const Box wide{box.low + moved - margin, box.high + moved + margin};
+    near_.clear();
+    for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i)
+        if (wide.contains(current(body_.facets[i], displacement))) near_.push_back(i);
+}
+
+double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
+    double most = 0.0;
+    for (const Facet& facet : body_.facets) {
+        double depth = 0.0;
+        Vec2 out;
+        if (depth_in(shape_, current(facet, displacement), depth, out)) most = std::max(most, depth);
+    }
+    return most;
+}
+
+Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
+    if (age_++ % steps_between_searches == 0) find_near(moved, displacement);
+    Vec2 total = Vec2::Zero();
+    stored_energy_ = 0.0;
+    for (const int i : near_) {
+        const Facet& facet = body_.facets[i];
+        double depth = 0.0;
+        Vec2 out;
+        if (!depth_in(shape_, current(facet, displacement) - moved, depth, out)) continue;
+        const Vec2 push = stiffness_[i] * depth * out;
+        for (int k = 0; k < 4; ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
+        total += push;
+        stored_energy_ += 0.5 * stiffness_[i] * depth * depth;
+    }
+    return total;
+}
+
+} // namespace crampfit

@@ -1,0 +1,90 @@
+#pragma once
+
+#include "forward/discretisation.hpp"
+
+#include <map>
+#include <vector>
+
+namespace crampfit {
+
+/// One end of a crack.
+struct CrackTip {
+    bool grows = false;
+    bool inside = false;     // the tip lies in the material; a crack that starts on a side has one tip only
+    Vec2 position;           // undeformed [m]
+    Vec2 direction;          // unit, ahead
+};
+
+/// A crack as a line in the undeformed specimen, from its `start` to its `end`.
+struct CrackLine {
+    std::vector<Vec2> points;  // [m]
+    CrackTip start;
+    CrackTip end;
+    double length = 0.0;       // of the part inside the specimen's rectangle [m]
+
+    CrackTip& tip(bool at_end) { return at_end ? end : start; }
+    const CrackTip& tip(bool at_end) const { return at_end ? end : start; }
+
+    /// The place a distance behind a tip along the crack [m]; the far end when the crack is shorter.
+    Vec2 behind(bool at_end, double distance) const;
+    /// Unit direction of the crack, seen toward a tip, at the place of the crack that is nearest to x.
+    Vec2 direction_near(bool at_end, const Vec2& x) const;
+};
+
+/// Two fields of one node, on either side of a crack.
+struct FieldPair {
+    int left;         // field on the left of the crack, seen from start to end
+    int right;        // field on the right
+    int node;         // where they are
+    int crack;
+    Vec2 normal;      // unit, from right to left
+    double plane_modulus;  // E' of the wood there [Pa]
+    double tie;       // stiffness that still holds the pair together [N/m]; 0 once the crack has cut the node's whole support
+};
+
+/// Which velocity field of a node a point belongs to (CRAMP; Nairn 2003): points that a crack separates from a node move with
+/// another field of that node. Fields are numbered: the nodes first, then further fields as cracks call for them.
+///
+/// A crack tip lies anywhere in a cell, but a pair of fields is either there or not, which alone would move the tip in steps of
+/// a cell. So a pair is tied by springs while the tip crosses the last cell of the node's support, and the spring yields such
+/// that the energy released goes linearly with the tip: with c the compliance of the pair and f the part of the way that the
+/// tip has gone, the energy released is 1/2 F^2 c / (1 + s c), which is f times that of the free pair when s = (1 - f) / (f c).
+class CrackFields {
+  public:
+    CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials);
+
+    struct NewField {
+        int field;
+        int from;  // the field whose motion it starts with
+    };
+
+    std::vector<CrackLine> lines;
+    std::vector<FieldPair> pairs;
+    std::vector<int> node_of_field;  // [fields] the node where each field is
+
+    int fields() const { return static_cast<int>(node_of_field.size()); }
+
+    /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Returns the fields that this adds.
+    std::vector<NewField> grow(int crack, bool at_end, const Vec2& to);
+
+    /// Displacement jump (left minus right) across a crack at a place on it, from the fields' displacements [m].
+    Vec2 opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const;
+
+  private:
+    bool is_left(int crack, const Vec2& x) const;
+    double freed(int crack, int node) const;
+    bool is_inside(const Vec2& x) const;
+    void sort_points(int crack, const Box& window);
+    int field(int node, unsigned mask, int crack);
+    void add_pairs(int node, unsigned mask);
+    void renew_ties(int crack);
+
+    const Scene& scene_;
+    Discretisation& body_;
+    const MaterialMap& materials_;
+    std::vector<std::array<std::uint8_t, 4>> mask_;     // [points] bit k: crack k lies between the point and the cell's node
+    std::map<std::pair<int, unsigned>, int> field_of_;  // node and mask to field, for masks above 0
+    std::vector<NewField> new_fields_;
+};
+
+} // namespace crampfit

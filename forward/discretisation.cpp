@@ -1,0 +1,132 @@
+#include "forward/discretisation.hpp"
+
+#include "datasets/error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace crampfit {
+
+Layout Layout::of(const Scene& scene) {
+    Layout layout;
+    const auto count = [&](double length) { return std::max(1, static_cast<int>(std::lround(length / scene.model.cell))); };
+    layout.cells_x = count(scene.specimen.size.x());
+    layout.cells_y = count(scene.specimen.size.y());
+    layout.cell = {scene.specimen.size.x() / layout.cells_x, scene.specimen.size.y() / layout.cells_y};
+    layout.per_side = static_cast<int>(std::lround(std::sqrt(scene.model.points_per_cell)));
+    layout.thickness = scene.model.thickness;
+    return layout;
+}
+
+int Layout::cell_at(const Vec2& x) const {
+    const int i = std::clamp(static_cast<int>(std::floor(x.x() / cell.x())), 0, cells_x - 1);
+    const int j = std::clamp(static_cast<int>(std::floor(x.y() / cell.y())), 0, cells_y - 1);
+    return cell_index(i, j);
+}
+
+Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials) : layout(Layout::of(scene)) {
+    const Vec2 size = layout.point_size();
+    const ShapeFunction kind =
+        scene.solver.shape_function == ShapeFunction::linear ? ShapeFunction::linear : ShapeFunction::gimp;
+    for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
+        const Vec2 place = size.cwiseProduct(Vec2(slot % layout.per_side + 0.5, slot / layout.per_side + 0.5));
+        weights.push_back(cell_weights(kind, place, layout.cell, 0.5 * size));
+    }
+    place_points(scene, materials);
+    if (points.count() == 0)
+        throw InputError(scene.file.string(), "specimen", scene.title, "no material is left: cutouts or void cover it all");
+    find_facets(scene);
+    if (!materials.homogeneous()) mark_changes();
+}
+
+void Discretisation::mark_changes() {
+    points.changes.assign(points.count(), 0);
+    for (int p = 0; p < points.count(); ++p) {
+        for (const auto& [step_x, step_y] : {std::pair{0, -1}, {1, 0}, {0, 1}, {-1, 0}}) {
+            const int other = neighbour(p, step_x, step_y);
+            if (other < 0) continue;
+            const Eigen::Vector4d change = points.layers[other] - points.layers[p];
+            if (change.cwiseQuotient(points.layers[p]).cwiseAbs().maxCoeff() > 1e-9) points.changes[p] = 1;
+        }
+    }
+}
+
+void Discretisation::place_points(const Scene& scene, const MaterialMap& materials) {
+    const Vec2 size = layout.point_size();
+    const int columns = layout.cells_x * layout.per_side;
+    points.lattice.assign(static_cast<std::size_t>(columns) * layout.cells_y * layout.per_side, -1);
+    points.first_of_cell.reserve(layout.cells() + 1);
+    for (int c = 0; c < layout.cells(); ++c) {
+        points.first_of_cell.push_back(points.count());
+        // Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point,
+        // and layers that share it would act too stiff across (with the ring specimen at 0.1 mm cells the force is 0.5 % too
+        // high by points and 0.1 % by cells).
+        const LocalWood wood = materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
+        for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
+            const int column = c % layout.cells_x * layout.per_side + slot % layout.per_side;
+            const int row = c / layout.cells_x * layout.per_side + slot / layout.per_side;
+            const Vec2 x = size.cwiseProduct(Vec2(column + 0.5, row + 0.5));
+            const auto& cutouts = scene.specimen.cutouts;
+            if (std::any_of(cutouts.begin(), cutouts.end(), [&](const Shape& s) { return inside(s, x); })) continue;
+            if (materials.at(x).filled == 0.0) continue;
+            points.lattice[static_cast<std::size_t>(row) * columns + column] = points.count();
+            points.position.push_back(x);
+            points.cell.push_back(c);
+            points.slot.push_back(static_cast<std::uint8_t>(slot));
+            points.node.push_back(layout.cell_nodes(c));
+            const Eigen::Matrix3d C = wood.elasticity.stiffness();
+            const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
+            for (int k = 0; k < 6; ++k) points.stiffness[k].push_back(constants[k]);
+            if (!materials.homogeneous()) points.layers.push_back(wood.elasticity.coefficients);
+            points.volume.push_back(size.prod() * layout.thickness);
+            points.mass.push_back(wood.density * points.volume.back());
+            points.poisson_ratio.push_back(wood.poisson_ratio);
+            points.latewood.push_back(static_cast<float>(wood.latewood));
+        }
+    }
+    points.first_of_cell.push_back(points.count());
+}
+
+int Discretisation::point_at(const Vec2& x) const {
+    const Vec2 place = x.cwiseQuotient(layout.point_size());
+    const int columns = layout.cells_x * layout.per_side;
+    const int rows = layout.cells_y * layout.per_side;
+    const int column = static_cast<int>(std::floor(place.x()));
+    const int row = static_cast<int>(std::floor(place.y()));
+    if (column < 0 || row < 0 || column >= columns || row >= rows) return -1;
+    return points.lattice[static_cast<std::size_t>(row) * columns + column];
+}
+
+int Discretisation::neighbour(int p, int step_x, int step_y) const {
+    return point_at(points.position[p] + layout.point_size().cwiseProduct(Vec2(step_x, step_y)));
+}
+
+void Discretisation::find_facets(const Scene& scene) {
+    const Vec2 size = layout.point_size();
+    const Box rectangle{Vec2::Zero(), layout.size()};
+    for (int p = 0; p < points.count(); ++p) {
+        for (const auto& [step_x, step_y] : {std::pair{0, -1}, {1, 0}, {0, 1}, {-1, 0}}) {
+            if (neighbour(p, step_x, step_y) >= 0) continue;
+            const Vec2 normal(step_x, step_y);
+            const Vec2 face = points.position[p] + 0.5 * size.cwiseProduct(normal);
+            Facet facet{p, face, step_x != 0 ? size.y() : size.x(), normal, {}};
+            const Vec2 beyond = face + 0.25 * size.cwiseProduct(normal);
+            for (const Shape& cutout : scene.specimen.cutouts) {
+                if (!rectangle.contains(beyond)) break;
+                const OutlinePoint on = nearest_on_outline(cutout, face);
+                if (on.distance > size.norm()) continue;
+                // Each face of the staircase stands for its projection on the true outline, so that lengths add up.
+                facet.position = on.position;
+                facet.normal = -on.normal;
+                facet.length *= std::max(0.0, facet.normal.dot(normal));
+                break;
+            }
+            const Vec2 place = (facet.position - layout.cell_corner(points.cell[p])).cwiseMax(Vec2::Zero()).cwiseMin(layout.cell);
+            facet.weight = cell_weights(ShapeFunction::linear, place, layout.cell, 0.5 * size).value;
+            if (facet.length > 0.0) facets.push_back(facet);
+        }
+    }
+}
+
+} // namespace crampfit

@@ -1,0 +1,41 @@
+#pragma once
+
+#include "forward/cracks.hpp"
+#include "forward/deformation.hpp"
+
+namespace crampfit {
+
+/// Fields at the grid's nodes, one entry a field of CrackFields.
+struct NodalState {
+    const std::vector<Vec2>& displacement;  // [m]
+    const std::vector<Vec2>& velocity;      // [m/s]
+    const std::vector<Vec2>& acceleration;  // [m/s^2]
+};
+
+struct TipLoad {
+    double G = 0;             // energy release rate [J/m^2]
+    double K_I = 0;           // [Pa sqrt(m)]
+    double K_II = 0;          // [Pa sqrt(m)]
+    Vec2 opening;             // displacement jump just behind the tip, the left face less the right [m]
+    double toughness = 0;     // of the wood at the tip [J/m^2]
+};
+
+/// Radii of the virtual extension, in cells. It shrinks where other wood is near, so that little hangs on the gradient term.
+struct EnergyReleaseOptions {
+    double inner = 2.0;        // the part that moves rigidly with the tip
+    double outer = 4.5;        // beyond it nothing moves
+    double least_inner = 1.0;        // holds the tied pair at the tip
+    double least_outer = 3.0;
+    bool rotates = false;
+};
+
+/// Energy release rate of one tip: the energy that the body gives up when a patch of the grid moves on with the tip while the
+/// wood stays where it is. In domain form (Nakamura, Shih and Freund 1985, eq. 8, with the inhomogeneity term of Eischen 1987
+/// and a virtual extension q that follows the crack):
+///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA,
+/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress. K_I and K_II share G = (K_I^2 + K_II^2)/E'
+/// in the ratio of the opening's components.
+TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
+                 const NodalState& state, const EnergyReleaseOptions& options);
+
+} // namespace crampfit

@@ -1,0 +1,185 @@
+#include "forward/explicit.hpp"
+
+#include "datasets/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
+    : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials),
+      internal_force_(body, plan.rotates) {
+    const std::size_t fields = cracks_.fields();
+    displacement_.assign(fields, Vec2::Zero());
+    velocity_.assign(fields, Vec2::Zero());
+    acceleration_.assign(fields, Vec2::Zero());
+    force_.assign(fields, Vec2::Zero());
+    reaction_.assign(scene.edges.size() + scene.bodies.size(), Vec2::Zero());
+    tip_loads_.resize(2 * cracks_.lines.size());
+    last_growth_.assign(2 * cracks_.lines.size(), 0.0);
+    weigh_nodes();
+    hold_nodes();
+    place_tractions();
+    place_bodies();
+}
+
+void ExplicitSolver::step() {
+    std::fill(force_.begin(), force_.end(), Vec2::Zero());
+    std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
+    internal_force_.add(displacement_, force_);
+    surface_forces();
+    tie_forces();
+    advance_velocities();
+    close_crack_faces();
+    prescribe_velocities();
+    advance_displacements();
+    time_ += plan_.time_step;
+}
+
+void ExplicitSolver::surface_forces() {
+    for (const Traction& t : tractions_) {
+        Vec2 velocity = Vec2::Zero();
+        for (int k = 0; k < 4; ++k) {
+            const int field = body_.points.node[t.facet.point][k];
+            force_[field] += t.facet.weight[k] * t.force;
+            velocity += t.facet.weight[k] * velocity_[field];
+        }
+        reaction_[t.driver] += t.force;
+        books_.work += plan_.time_step * t.force.dot(velocity);
+    }
+    for (std::size_t i = 0; i < sliding_.size(); ++i) {
+        const int driver = sliding_driver_[i];
+        reaction_[driver] = sliding_[i].push(moved(driver), displacement_, force_);
+        books_.work += plan_.time_step * reaction_[driver].dot(velocity_of(driver, time_));
+    }
+}
+
+double ExplicitSolver::tie_stiffness(const FieldPair& pair) const {
+    // A crack between two rows of nodes has a pair on either: they share the tie as they share the mass beyond the crack.
+    const double left = mass_[pair.left];
+    const double right = mass_[pair.right];
+    const double share = 4.0 * left * right / ((left + right) * (left + right));
+    return std::min(share * pair.tie, plan_.added_frequency_squared * left * right / (left + right));
+}
+
+void ExplicitSolver::tie_forces() {
+    for (const FieldPair& pair : cracks_.pairs) {
+        if (pair.tie == 0.0 || mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) continue;
+        const Vec2 pull = tie_stiffness(pair) * (displacement_[pair.left] - displacement_[pair.right]);
+        force_[pair.left] -= pull;
+        force_[pair.right] += pull;
+    }
+}
+
+void ExplicitSolver::advance_velocities() {
+    const double dt = plan_.time_step;
+    const double drag = 0.5 * dt * scene_.solver.damping;
+    for (std::size_t n = 0; n < mass_.size(); ++n) {
+        if (mass_[n] == 0.0) continue;
+        const Vec2 before = velocity_[n];
+        velocity_[n] = ((1.0 - drag) * before + dt / mass_[n] * force_[n]) / (1.0 + drag);
+        acceleration_[n] = (velocity_[n] - before) / dt;
+        if (drag > 0.0) books_.damped += mass_[n] * drag * 0.5 * (before + velocity_[n]).squaredNorm();
+    }
+}
+
+void ExplicitSolver::close_crack_faces() {
+    const double dt = plan_.time_step;
+    for (const FieldPair& pair : cracks_.pairs) {
+        const double m_left = mass_[pair.left];
+        const double m_right = mass_[pair.right];
+        if (m_left == 0.0 || m_right == 0.0) continue;
+        const Vec2 gap = displacement_[pair.left] - displacement_[pair.right];
+        const Vec2 rate = velocity_[pair.left] - velocity_[pair.right];
+        const double open = gap.dot(pair.normal);
+        const double slowest = -std::max(open, 0.0) / dt;  // closes just now, no further
+        const double too_fast = slowest - rate.dot(pair.normal);
+        if (too_fast <= 0.0) continue;
+        Vec2 change = too_fast * pair.normal;
+        if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) {
+            const Vec2 along = left_of(pair.normal);
+            change -= rate.dot(along) * along;
+        }
+        const double total = m_left + m_right;
+        velocity_[pair.left] += m_right / total * change;
+        velocity_[pair.right] -= m_left / total * change;
+        acceleration_[pair.left] += m_right / total * change / dt;
+        acceleration_[pair.right] -= m_left / total * change / dt;
+    }
+}
+
+void ExplicitSolver::prescribe_velocities() {
+    const double dt = plan_.time_step;
+    for (const Held& held : held_) {
+        double& v = velocity_[held.field][held.axis];
+        const double wanted = velocity_of(held.driver, time_ + 0.5 * dt)[held.axis];
+        const double force = mass_[held.field] * (wanted - v) / dt;
+        books_.work += force * dt * wanted;
+        reaction_[held.driver][held.axis] += force;
+        acceleration_[held.field][held.axis] += (wanted - v) / dt;
+        v = wanted;
+    }
+}
+
+void ExplicitSolver::advance_displacements() {
+    const double dt = plan_.time_step;
+    for (std::size_t n = 0; n < mass_.size(); ++n) displacement_[n] += dt * velocity_[n];
+}
+
+TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
+    EnergyReleaseOptions options;
+    options.rotates = plan_.rotates;
+    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_}, options);
+}
+
+EnergyBooks ExplicitSolver::energies() const {
+    EnergyBooks books = books_;
+    books.strain = internal_force_.energy(displacement_);
+    for (const FieldPair& pair : cracks_.pairs)
+        if (pair.tie > 0.0 && mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0)
+            books.strain += 0.5 * tie_stiffness(pair) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
+    for (std::size_t n = 0; n < mass_.size(); ++n)
+        books.kinetic += 0.5 * mass_[n] * (velocity_[n] + 0.5 * plan_.time_step * acceleration_[n]).squaredNorm();
+    for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
+    return books;
+}
+
+bool ExplicitSolver::is_finite() const {
+    return std::all_of(displacement_.begin(), displacement_.end(), [](const Vec2& u) { return u.allFinite(); });
+}
+
+void ExplicitSolver::grow_cracks() {
+    constexpr double increment_in_cells = 0.25;
+    const double increment = increment_in_cells * body_.layout.cell.minCoeff();
+    for (int k = 0; k < static_cast<int>(cracks_.lines.size()); ++k) {
+        for (const bool at_end : {false, true}) {
+            const CrackTip tip = cracks_.lines[k].tip(at_end);
+            if (!tip.grows || !tip.inside) continue;
+            TipLoad& load = tip_loads_[2 * k + at_end];
+            load = load_at(k, at_end);
+            if (load.G < load.toughness) continue;
+            // A crack cannot outrun the Rayleigh wave (Freund 1990); Viktorov's fit for its speed.
+            const LocalWood wood = materials_.at(tip.position);
+            const double nu = wood.poisson_ratio;
+            const double rayleigh = (0.862 + 1.14 * nu) / (1.0 + nu) * std::sqrt(wood.shear_modulus() / wood.density);
+            double& last = last_growth_[2 * k + at_end];
+            if (time_ - last < increment / rayleigh) continue;
+            last = time_;
+
+            Vec2 direction = tip.direction;
+            if (scene_.cracks[k].direction == GrowthDirection::normal_to_opening) {
+                // Normal to the opening displacement (Nairn 2007), on the side that lies ahead.
+                const Vec2 normal = left_of(load.opening);
+                if (std::abs(normal.dot(tip.direction)) > 0.1 * normal.norm())
+                    direction = normal.normalized() * (normal.dot(tip.direction) > 0 ? 1.0 : -1.0);
+            }
+            books_.fracture += load.toughness * increment * body_.layout.thickness;
+            adopt(cracks_.grow(k, at_end, tip.position + increment * direction));
+        }
+    }
+}
+
+} // namespace crampfit

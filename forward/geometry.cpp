@@ -1,0 +1,96 @@
+#include "forward/geometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crampfit {
+
+namespace {
+
+double signed_area(const std::vector<Vec2>& points) {
+    double twice = 0.0;
+    for (std::size_t k = 0; k < points.size(); ++k) twice += cross(points[k], points[(k + 1) % points.size()]);
+    return 0.5 * twice;
+}
+
+bool inside_polygon(const std::vector<Vec2>& points, const Vec2& x) {
+    bool in = false;
+    for (std::size_t k = 0, last = points.size() - 1; k < points.size(); last = k++) {
+        const Vec2& a = points[k];
+        const Vec2& b = points[last];
+        if ((a.y() > x.y()) != (b.y() > x.y()) &&
+            x.x() < (b.x() - a.x()) * (x.y() - a.y()) / (b.y() - a.y()) + a.x())
+            in = !in;
+    }
+    return in;
+}
+
+OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x) {
+    const double sense = signed_area(points) > 0 ? 1.0 : -1.0;
+    OutlinePoint best{Vec2::Zero(), Vec2::Zero(), std::numeric_limits<double>::infinity()};
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        const Vec2& a = points[k];
+        const Vec2& b = points[(k + 1) % points.size()];
+        const Vec2 on = a + nearest_on_segment(a, b, x) * (b - a);
+        const double distance = (x - on).norm();
+        if (distance < best.distance) best = {on, -sense * left_of((b - a).normalized()), distance};
+    }
+    return best;
+}
+
+} // namespace
+
+bool inside(const Shape& shape, const Vec2& x) {
+    if (const auto* circle = std::get_if<Circle>(&shape)) return (x - circle->centre).norm() <= circle->radius;
+    const auto& points = std::get<Polygon>(shape).points;
+    return inside_polygon(points, x);
+}
+
+Box bounds(const Shape& shape) {
+    if (const auto* circle = std::get_if<Circle>(&shape))
+        return {circle->centre.array() - circle->radius, circle->centre.array() + circle->radius};
+    const auto& points = std::get<Polygon>(shape).points;
+    Box box{points.front(), points.front()};
+    for (const Vec2& x : points) {
+        box.low = box.low.cwiseMin(x);
+        box.high = box.high.cwiseMax(x);
+    }
+    return box;
+}
+
+OutlinePoint nearest_on_outline(const Shape& shape, const Vec2& x) {
+    if (const auto* circle = std::get_if<Circle>(&shape)) {
+        const Vec2 arm = x - circle->centre;
+        const double reach = arm.norm();
+        const Vec2 normal = reach > 0 ? Vec2(arm / reach) : Vec2(0.0, 1.0);
+        return {circle->centre + circle->radius * normal, normal, std::abs(reach - circle->radius)};
+    }
+    return nearest_on_polygon(std::get<Polygon>(shape).points, x);
+}
+
+std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, const Box& box) {
+    double enter = 0.0;
+    double leave = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 2; ++axis) {
+        const double d = direction[axis];
+        if (d == 0.0) {
+            if (origin[axis] < box.low[axis] || origin[axis] > box.high[axis]) return std::nullopt;
+            continue;
+        }
+        const double to_low = (box.low[axis] - origin[axis]) / d;
+        const double to_high = (box.high[axis] - origin[axis]) / d;
+        enter = std::max(enter, std::min(to_low, to_high));
+        leave = std::min(leave, std::max(to_low, to_high));
+    }
+    if (leave <= enter) return std::nullopt;
+    return leave;
+}
+
+double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x) {
+    const Vec2 along = b - a;
+    const double squared = along.squaredNorm();
+    return squared > 0 ? std::clamp((x - a).dot(along) / squared, 0.0, 1.0) : 0.0;
+}
+
+} // namespace crampfit

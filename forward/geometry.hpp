@@ -1,0 +1,44 @@
+#pragma once
+
+#include "datasets/scene.hpp"
+
+#include <optional>
+
+namespace crampfit {
+
+inline double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// A quarter turn counter-clockwise.
+inline Vec2 left_of(const Vec2& a) { return {-a.y(), a.x()}; }
+
+struct Box {
+    Vec2 low;   // [m]
+    Vec2 high;  // [m]
+
+    bool contains(const Vec2& x) const { return (x.array() >= low.array()).all() && (x.array() <= high.array()).all(); }
+    bool touches(const Box& b) const {
+        return (low.array() <= b.high.array()).all() && (b.low.array() <= high.array()).all();
+    }
+};
+
+/// True inside the shape and on its outline.
+bool inside(const Shape& shape, const Vec2& x);
+
+Box bounds(const Shape& shape);
+
+struct OutlinePoint {
+    Vec2 position;    // [m]
+    Vec2 normal;      // unit, out of the shape
+    double distance;  // from the asked point, always positive [m]
+};
+
+/// The place on a shape's outline that is nearest to x.
+OutlinePoint nearest_on_outline(const Shape& shape, const Vec2& x);
+
+/// Where along a ray from `origin` with unit `direction` it leaves the box for good; nothing when it misses the box [m].
+std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, const Box& box);
+
+/// Nearest place on segment a-b to x, as a fraction of the way from a to b.
+double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x);
+
+} // namespace crampfit

@@ -1,0 +1,112 @@
+#include "forward/internal_force.hpp"
+
+#include "forward/deformation.hpp"
+
+#include <algorithm>
+
+namespace crampfit {
+
+InternalForce::InternalForce(const Discretisation& body, bool rotates) : body_(body), rotates_(rotates) { sort_cells(); }
+
+void InternalForce::sort_cells() {
+    const Points& points = body_.points;
+    whole_cells_.clear();
+    loose_points_.clear();
+    for (int c = 0; c < body_.layout.cells(); ++c) {
+        const int first = points.first_of_cell[c];
+        const int last = points.first_of_cell[c + 1];
+        const auto same = [&](const std::array<int, 4>& node) { return node == points.node[first]; };
+        if (body_.cell_is_full(c) && std::all_of(points.node.begin() + first, points.node.begin() + last, same))
+            whole_cells_.push_back(c);
+        else
+            for (int p = first; p < last; ++p) loose_points_.push_back(p);
+    }
+}
+
+template <int PointsPerCell, bool Rotates>
+void InternalForce::add_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+    using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
+    const Points& points = body_.points;
+    std::array<Lane, 4> slope_x, slope_y;
+    for (int k = 0; k < 4; ++k) {
+        for (int slot = 0; slot < PointsPerCell; ++slot) {
+            slope_x[k][slot] = body_.weights[slot].slope_x[k];
+            slope_y[k][slot] = body_.weights[slot].slope_y[k];
+        }
+    }
+    for (const int c : whole_cells_) {
+        const int first = points.first_of_cell[c];
+        const std::array<int, 4>& node = points.node[first];
+        Lane xx = Lane::Zero(), xy = Lane::Zero(), yx = Lane::Zero(), yy = Lane::Zero();  // du_i / dX_j
+        for (int k = 0; k < 4; ++k) {
+            const Vec2 u = displacement[node[k]];
+            xx += u.x() * slope_x[k];
+            xy += u.x() * slope_y[k];
+            yx += u.y() * slope_x[k];
+            yy += u.y() * slope_y[k];
+        }
+        const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
+        const auto C = [&](int k) { return Eigen::Map<const Lane>(&points.stiffness[k][first]); };
+        Lane cosine, sine, strain_xx, strain_yy, shear;
+        if constexpr (Rotates) {  // elastic_state, written out for many points at once
+            const Lane c_part = 2.0 + xx + yy;
+            const Lane s_part = yx - xy;
+            const Lane scale = 1.0 / (c_part * c_part + s_part * s_part).sqrt();
+            cosine = c_part * scale;
+            sine = s_part * scale;
+            strain_xx = cosine * (1.0 + xx) + sine * yx - 1.0;
+            strain_yy = cosine * (1.0 + yy) - sine * xy - 1.0;
+            shear = 2.0 * (cosine * xy + sine * (1.0 + yy));
+        } else {
+            strain_xx = xx;
+            strain_yy = yy;
+            shear = xy + yx;
+        }
+        const Lane local_xx = volume * (C(0) * strain_xx + C(1) * strain_yy + C(4) * shear);
+        const Lane local_yy = volume * (C(1) * strain_xx + C(2) * strain_yy + C(5) * shear);
+        const Lane local_xy = volume * (C(4) * strain_xx + C(5) * strain_yy + C(3) * shear);
+        Lane P_xx = local_xx, P_xy = local_xy, P_yx = local_xy, P_yy = local_yy;
+        if constexpr (Rotates) {
+            P_xx = cosine * local_xx - sine * local_xy;
+            P_xy = cosine * local_xy - sine * local_yy;
+            P_yx = sine * local_xx + cosine * local_xy;
+            P_yy = sine * local_xy + cosine * local_yy;
+        }
+        for (int k = 0; k < 4; ++k) {
+            force[node[k]].x() -= (P_xx * slope_x[k] + P_xy * slope_y[k]).sum();
+            force[node[k]].y() -= (P_yx * slope_x[k] + P_yy * slope_y[k]).sum();
+        }
+    }
+}
+
+void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+    const auto whole = [&]<int N>() {
+        rotates_ ? add_whole_cells<N, true>(displacement, force) : add_whole_cells<N, false>(displacement, force);
+    };
+    switch (body_.layout.per_side) {
+        case 1: whole.template operator()<1>(); break;
+        case 2: whole.template operator()<4>(); break;
+        case 3: whole.template operator()<9>(); break;
+        case 4: whole.template operator()<16>(); break;
+        default: whole.template operator()<25>(); break;
+    }
+    const Points& points = body_.points;
+    for (const int p : loose_points_) {
+        const PointState state =
+            elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
+        const CellWeights& w = body_.weights[points.slot[p]];
+        for (int k = 0; k < 4; ++k)
+            force[points.node[p][k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
+    }
+}
+
+double InternalForce::energy(const std::vector<Vec2>& displacement) const {
+    const Points& points = body_.points;
+    double sum = 0.0;
+    for (int p = 0; p < points.count(); ++p)
+        sum += points.volume[p] *
+               elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_).energy;
+    return sum;
+}
+
+} // namespace crampfit

@@ -1,0 +1,174 @@
+#include "forward/plan.hpp"
+
+#include "datasets/error.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crampfit {
+
+namespace {
+
+// Rotations above this give a small-strain model a false strain of half their square: 2e-4, a hundredth of the strain at
+// which earlywood cracks.
+constexpr double most_rotation = 0.02;
+
+// Part of the stable time step that is used. Contact and ties may add `added_stiffness` to the squared highest frequency.
+constexpr double courant = 0.95;
+constexpr double added_stiffness = 0.3;
+
+// Point steps a second on one core, for the estimate of seconds only; `benchmark_forward` measures it.
+constexpr double expected_speed = 4e7;
+
+void refuse(const Scene& scene, const std::string& key, const std::string& value, const std::string& rule) {
+    throw InputError(scene.file.string(), key, value, rule);
+}
+
+void check_solver(const Scene& scene) {
+    if (scene.solver.kind == SolverKind::quasistatic)
+        refuse(scene, "solver.kind", "quasistatic", "not available in this version; use \"auto\" or \"explicit\"");
+    if (scene.solver.shape_function == ShapeFunction::bspline2 || scene.solver.shape_function == ShapeFunction::cpdi)
+        refuse(scene, "solver.shape_function", scene.solver.shape_function == ShapeFunction::cpdi ? "cpdi" : "bspline2",
+               "not available in this version; use \"auto\", \"gimp\" or \"linear\"");
+    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
+        const Crack& crack = scene.cracks[k];
+        const std::string key = "cracks." + std::to_string(k);
+        if (crack.advance > 0.0)
+            refuse(scene, key + ".advance", fmt::format("{} mm", crack.advance * 1e3),
+                   "only 0 mm (G at the tip itself) is available in this version");
+        if (crack.direction == GrowthDirection::hoop_stress || crack.direction == GrowthDirection::energy_release_rate)
+            refuse(scene, key + ".direction",
+                   crack.direction == GrowthDirection::hoop_stress ? "hoop stress" : "energy release rate",
+                   "not available in this version; use \"normal to opening\" or \"straight\"");
+        if (crack.faces.kind == CrackFaces::Kind::friction)
+            refuse(scene, key + ".faces", fmt::format("friction = {}", crack.faces.coefficient),
+                   "friction is not available in this version; use \"frictionless\" or \"stick\"");
+    }
+    for (const Body& body : scene.bodies)
+        if (body.contact.kind == Contact::Kind::friction)
+            refuse(scene, "bodies." + body.name + ".contact", fmt::format("friction = {}", body.contact.coefficient),
+                   "friction is not available in this version; use \"frictionless\" or \"bonded\"");
+}
+
+// Highest squared frequency that any point can take part in: with the point as an element of its own, its stiffness over its
+// share of the nodes' mass. No way of joining the points, so no crack, exceeds it (Irons and Treharne 1971).
+double highest_frequency_squared(const Discretisation& body) {
+    double fastest = 0.0;
+    for (int p = 0; p < body.points.count(); ++p)
+        fastest = std::max(fastest, body.points.stiffest(p) / body.points.density(p));
+    double highest = 0.0;
+    for (int p = 0; p < body.points.count(); ++p) {
+        const double density = body.points.density(p);
+        if (body.points.stiffest(p) / density < 0.5 * fastest) continue;
+        const CellWeights& w = body.weights[body.points.slot[p]];
+        Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+        for (int k = 0; k < 4; ++k) {
+            Eigen::Matrix<double, 3, 2> B;
+            B << w.slope_x[k], 0, 0, w.slope_y[k], w.slope_y[k], w.slope_x[k];
+            spread += B * B.transpose() / w.value[k];
+        }
+        const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(body.points.stiffness_of(p)).operatorSqrt();
+        const Eigen::Vector3d values =
+            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(root * spread * root, Eigen::EigenvaluesOnly).eigenvalues();
+        highest = std::max(highest, values[2] / density);
+    }
+    return highest;
+}
+
+double speed_of(const Edge& edge) { return std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)); }
+double speed_of(const Body& body) { return body.velocity.norm(); }
+
+// When the run ends at the latest, by the stop conditions on time and on a displacement that is prescribed [s].
+double end_time(const Scene& scene) {
+    double end = scene.stop.time.value_or(std::numeric_limits<double>::infinity());
+    const auto consider = [&](const auto& driver) {
+        if (driver.name == scene.measure.displacement && scene.stop.displacement && speed_of(driver) > 0.0)
+            end = std::min(end, *scene.stop.displacement / speed_of(driver));
+    };
+    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
+    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
+    return end;
+}
+
+// The farthest that any edge or body goes until then [m]; infinite where nothing bounds it.
+double farthest_motion(const Scene& scene, double end) {
+    double farthest = 0.0;
+    const auto consider = [&](const auto& driver) {
+        if (speed_of(driver) > 0.0)
+            farthest = std::max(farthest, speed_of(driver) * std::min(end, driver.until.value_or(end)));
+    };
+    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
+    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
+    return farthest;
+}
+
+} // namespace
+
+Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
+    check_solver(scene);
+    Plan plan;
+    const auto choose = [&](std::string part, std::string choice, std::string reason) {
+        plan.choices.push_back({std::move(part), std::move(choice), std::move(reason)});
+    };
+    plan.end_time = end_time(scene);
+
+    const double smallest = scene.specimen.size.minCoeff();
+    const double motion = farthest_motion(scene, plan.end_time);
+    plan.rotates = motion > most_rotation * smallest;
+    choose("solver", "explicit dynamics", "the solver of this version: central differences in time, inertia kept");
+    choose("reference", "undeformed specimen (total Lagrangian)",
+           "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
+    choose("shape function", scene.solver.shape_function == ShapeFunction::linear ? "linear" : "GIMP",
+           "in the undeformed specimen a point's domain lies in one cell, where linear and GIMP weights are the same");
+    choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
+           fmt::format("edges and bodies move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
+                       motion / smallest, most_rotation));
+    choose("material", materials.homogeneous() ? "one isotropic material" : "isotropic wood by place; points that a boundary crosses act as layers",
+           materials.homogeneous() ? "no orientation, no history" : "band widths do not round to points; J carries the material-gradient term");
+
+    for (const Crack& crack : scene.cracks) plan.grows |= crack.grows != Growth::none;
+    if (scene.cracks.empty()) choose("crack fields", "none", "no crack");
+    else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
+                "two fields at nodes whose support a crack cuts, one elsewhere");
+    if (!scene.cracks.empty())
+        choose("J, K", plan.grows ? "every second step at each growing tip" : "at saved instants", "domain form, 4 cells around the tip");
+    plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                               [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
+    choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",
+           plan.contact ? "penalty of one cell's stiffness, never pulls" : "no body that slides");
+
+    const double highest = highest_frequency_squared(body);
+    plan.added_frequency_squared = plan.contact || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
+    plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
+    double slowest = std::numeric_limits<double>::infinity();
+    for (int p = 0; p < body.points.count(); ++p)
+        slowest = std::min(slowest, std::sqrt(body.points.stiffest(p) / body.points.density(p)));
+    plan.slowness = plan.end_time * slowest / scene.specimen.size.maxCoeff();
+    return plan;
+}
+
+std::string describe(const Scene& scene, const Plan& plan, const Discretisation& body) {
+    std::string text;
+    if (!scene.title.empty()) text += scene.title + "\n";
+    for (const auto& [part, choice, reason] : plan.choices) text += fmt::format("{:<15} {}\n{:<15}   because: {}\n", part, choice, "", reason);
+    text += fmt::format("{:<15} {} x {} cells of {:.4g} x {:.4g} mm, {} points, {} nodes\n", "grid", body.layout.cells_x,
+                        body.layout.cells_y, body.layout.cell.x() * 1e3, body.layout.cell.y() * 1e3, body.points.count(),
+                        body.layout.nodes());
+    text += fmt::format("{:<15} {:.4g} us\n", "time step", plan.time_step * 1e6);
+    if (std::isfinite(plan.end_time)) {
+        const double steps = std::ceil(plan.end_time / plan.time_step);
+        text += fmt::format("{:<15} {:.4g} steps to {:.4g} ms, about {:.2g} s on one core at most\n", "cost", steps,
+                            plan.end_time * 1e3, steps * body.points.count() / expected_speed);
+        text += fmt::format("{:<15} the load takes {:.3g} wave transits of the specimen; vibration is felt below about 50\n",
+                            "loading", plan.slowness);
+    } else {
+        text += fmt::format("{:<15} not known before the run: no stop condition on time or displacement\n", "cost");
+    }
+    return text;
+}
+
+} // namespace crampfit

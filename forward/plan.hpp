@@ -1,0 +1,33 @@
+#pragma once
+
+#include "forward/discretisation.hpp"
+
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// What this scene needs, decided once. Nothing that it leaves out is allocated or looped over.
+struct Plan {
+    bool rotates = false;       // finite rotation; else small strain
+    bool grows = false;         // some tip may grow
+    bool contact = false;       // some body can touch and slide
+    double time_step = 0;       // [s]
+    double added_frequency_squared = 0;  // what contact and ties may add to the highest squared frequency [1/s^2]
+    double end_time = 0;        // when a stop condition on time or displacement is met [s]; infinite: none is
+    double slowness = 0;        // transits of the specimen by a wave while the load is applied
+
+    struct Choice {
+        std::string part;
+        std::string choice;
+        std::string reason;
+    };
+    std::vector<Choice> choices;  // for `crampfit explain`
+};
+
+/// Checks that a solver here can do what is asked, and decides. Throws InputError naming the key that it cannot honour.
+Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body);
+
+std::string describe(const Scene& scene, const Plan& plan, const Discretisation& body);
+
+} // namespace crampfit

@@ -1,0 +1,63 @@
+#pragma once
+
+#include "datasets/record.hpp"
+#include "forward/explicit.hpp"
+
+namespace crampfit {
+
+/// Watches a run and keeps what the scene asks for: rows of the series at even intervals, frames at even progress.
+class Recorder {
+  public:
+    Recorder(const Scene& scene, const Plan& plan, const Discretisation& body, const ExplicitSolver& solver);
+
+    /// After every step: takes part in the mean force of the next row.
+    void add_step();
+
+    /// Before every step: saves a row and a frame when they are due.
+    void look();
+
+    /// Saves the last instant.
+    void finish(RunStatus status, std::string message);
+
+    /// Time, displacement and crack length now; the rest as of the last row.
+    Instant now() const;
+
+    /// How far the nearest stop condition is, 0..1.
+    double fraction() const;
+
+    bool is_finite() const { return finite_; }
+    Record take() { return std::move(record_); }
+
+  private:
+    struct Gauge {     // an edge or body that is measured, and along which direction
+        int driver;
+        Vec2 direction;
+    };
+
+    int driver_named(const std::string& name) const;
+    Vec2 direction_of(int driver) const;
+    void save_row();
+    void save_frame();
+    void thin_out();
+
+    const Scene& scene_;
+    const Plan& plan_;
+    const Discretisation& body_;
+    const ExplicitSolver& solver_;
+    Gauge force_;
+    Gauge displacement_;
+    int crack_ = -1;        // the one in the series; -1: none
+    bool at_end_ = true;
+
+    Record record_;
+    long interval_ = 1;     // steps between rows
+    bool evenly_ = true;    // the interval is known from the end time
+    long steps_ = 0;
+    long next_row_ = 0;
+    int frames_saved_ = 0;
+    std::vector<Vec2> reaction_sum_;
+    long reaction_count_ = 0;
+    bool finite_ = true;
+};
+
+} // namespace crampfit

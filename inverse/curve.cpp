@@ -1,0 +1,98 @@
+#include "inverse/curve.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+
+namespace crampfit {
+
+Curve::Curve(std::span<const double> x, std::span<const double> y) {
+    assert(x.size() == y.size());
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!std::isnan(x[i]) && !std::isnan(y[i])) {
+            rows.push_back(i);
+        }
+    }
+    assert(!rows.empty());
+    std::stable_sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+    for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+        double sum = 0;
+        while (end < rows.size() && x[rows[end]] == x[rows[begin]]) {
+            sum += y[rows[end++]];
+        }
+        x_.push_back(x[rows[begin]]);
+        y_.push_back(sum / static_cast<double>(end - begin));
+    }
+    integrate();
+}
+
+void Curve::integrate() {
+    area_.assign(x_.size(), 0.0);
+    for (std::size_t i = 1; i < x_.size(); ++i) {
+        area_[i] = area_[i - 1] + 0.5 * (y_[i] + y_[i - 1]) * (x_[i] - x_[i - 1]);
+    }
+    after_ = y_.back();
+}
+
+double Curve::at(double x) const {
+    if (x <= x_.front()) {
+        return y_.front();
+    }
+    if (x > x_.back()) {
+        return after_;
+    }
+    const auto above = static_cast<std::size_t>(std::lower_bound(x_.begin(), x_.end(), x) - x_.begin());
+    return std::lerp(y_[above - 1], y_[above], (x - x_[above - 1]) / (x_[above] - x_[above - 1]));
+}
+
+double Curve::area(double x) const {
+    if (x <= x_.front()) {
+        return y_.front() * (x - x_.front());
+    }
+    if (x > x_.back()) {
+        return area_.back() + after_ * (x - x_.back());
+    }
+    const auto above = static_cast<std::size_t>(std::lower_bound(x_.begin(), x_.end(), x) - x_.begin());
+    return area_[above - 1] + 0.5 * (y_[above - 1] + at(x)) * (x - x_[above - 1]);
+}
+
+double Curve::mean(double from, double to) const {
+    return to > from ? (area(to) - area(from)) / (to - from) : at(from);
+}
+
+int Curve::count(double from, double to) const {
+    return static_cast<int>(std::lower_bound(x_.begin(), x_.end(), to) - std::lower_bound(x_.begin(), x_.end(), from));
+}
+
+Curve Curve::smoothed(double window) const {
+    Curve result = *this;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        const double half = std::min({0.5 * window, x_[i] - x_.front(), x_.back() - x_[i]});
+        result.y_[i] = mean(x_[i] - half, x_[i] + half);
+    }
+    result.integrate();
+    return result;
+}
+
+std::optional<double> Curve::arrival(double level) const {
+    const auto reached = std::find_if(y_.begin(), y_.end(), [level](double y) { return y >= level; });
+    if (reached == y_.end()) {
+        return std::nullopt;
+    }
+    const auto crossing = [&](std::size_t below) {
+        return std::lerp(x_[below], x_[below + 1], (level - y_[below]) / (y_[below + 1] - y_[below]));
+    };
+    const auto first = static_cast<std::size_t>(reached - y_.begin());
+    const double early = first == 0 ? x_.front() : crossing(first - 1);
+    std::size_t above = y_.size();  // the nodes from here on are all at the level or above it
+    while (above > 0 && y_[above - 1] >= level) {
+        --above;
+    }
+    const double late = above == 0 ? x_.front() : above == y_.size() ? x_.back() : crossing(above - 1);
+    return 0.5 * (early + late);
+}
+
+}  // namespace crampfit

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace crampfit {
+
+/// A piecewise linear curve y(x). Units are the caller's.
+class Curve {
+  public:
+    /// From rows in any order: rows with a NaN are skipped, rows at the same x become their mean. At least one row must
+    /// be left.
+    Curve(std::span<const double> x, std::span<const double> y);
+
+    /// Value that the curve has after its last node, instead of the last node's value.
+    void continue_with(double value) { after_ = value; }
+
+    double at(double x) const;                  // the first value continues to the left
+    double mean(double from, double to) const;  // average over an interval; of no width: the value there
+    int count(double from, double to) const;    // nodes in [from, to)
+
+    /// The same nodes, each with the average over a window about it. Near an end the window shrinks from both sides
+    /// alike, so that a straight line stays what it is.
+    Curve smoothed(double window) const;
+
+    /// Where the curve comes up to `level`: midway between where it first reaches it and where it is last below it,
+    /// which for a rising curve is one place and for a noisy one has no bias towards early arrival. Absent when it is
+    /// never reached.
+    std::optional<double> arrival(double level) const;
+
+    const std::vector<double>& x() const { return x_; }
+    const std::vector<double>& y() const { return y_; }
+
+  private:
+    double area(double x) const;  // integral from the first node
+    void integrate();
+
+    std::vector<double> x_;  // strictly rising
+    std::vector<double> y_;
+    std::vector<double> area_;  // integral from the first node to each
+    double after_ = 0;
+};
+
+}  // namespace crampfit

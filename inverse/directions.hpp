@@ -1,0 +1,34 @@
+#pragma once
+
+#include "inverse/local_model.hpp"
+#include "inverse/objective.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+
+namespace crampfit {
+
+/// How the residuals change about the best run: the slope J of a polynomial through the runs near it, its columns
+/// scaled to length one, taken apart into singular values.
+struct Directions {
+    Run best;
+    LocalModel model;
+    double radius = 0;         // of the differences that the model rests on, a part of the box
+    Eigen::VectorXd scale;     // of x: 1 / length of J's columns [parameters]
+    Eigen::VectorXd singular;  // falling [parameters]
+    Eigen::VectorXd error;     // one sigma of each singular value, by the model's scatter [parameters]
+    Eigen::MatrixXd u;         // [residuals x parameters]
+    Eigen::MatrixXd v;         // in scaled x [parameters x parameters]
+
+    /// Whether J tells direction k from zero.
+    bool resolved(Eigen::Index k) const;
+    bool all_resolved() const;
+};
+
+/// Runs the differences about the best run that have not been run yet, and takes wider ones where the model's scatter
+/// hides a slope. A difference that turns out better than the best run takes its place. Absent where too few runs near
+/// it ended well. There must be a usable run.
+std::optional<Directions> directions_about_best(Objective& objective);
+
+}  // namespace crampfit

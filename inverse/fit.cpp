@@ -1,0 +1,206 @@
+#include "inverse/fit.hpp"
+
+#include "datasets/error.hpp"
+#include "forward/simulate.hpp"
+#include "inverse/pool.hpp"
+#include "inverse/search.hpp"
+#include "inverse/study_model.hpp"
+#include "inverse/uncertainty.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+namespace crampfit {
+namespace {
+
+constexpr double bound_tolerance = 1e-4;  // of the box
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+Record simulate_alone(const Scene& scene, const std::atomic<bool>* stop) {
+    SimulateOptions options;
+    options.threads = 1;  // the cores are busy with other runs
+    options.stop_requested = stop;
+    return simulate(scene, options);
+}
+
+std::vector<double> in_units(const UnitBox& box, const Eigen::VectorXd& x) {
+    std::vector<double> values;
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        values.push_back(box.value(j, x[j]) / box.parameters()[static_cast<std::size_t>(j)].unit_factor);
+    }
+    return values;
+}
+
+/// Tells the caller after each run where the fit stands.
+class Reporter {
+  public:
+    Reporter(const FitOptions& options, const UnitBox& box, int max_runs) : options_(options), box_(box) {
+        progress_.max_runs = max_runs;
+        progress_.best_misfit = std::numeric_limits<double>::infinity();
+    }
+
+    void set_stage(const std::string& stage) {
+        const std::lock_guard lock(mutex_);
+        progress_.stage = stage;
+    }
+
+    void add(const Run& run) {
+        const std::lock_guard lock(mutex_);
+        ++progress_.runs;
+        progress_.seconds = seconds_since(begin_);
+        if (run.evaluation->usable() && run.evaluation->misfit < progress_.best_misfit) {
+            progress_.best_misfit = run.evaluation->misfit;
+            progress_.best = in_units(box_, run.x);
+        }
+        if (options_.progress) {
+            options_.progress(progress_);
+        }
+    }
+
+  private:
+    const FitOptions& options_;
+    const UnitBox& box_;
+    Clock::time_point begin_ = Clock::now();
+    std::mutex mutex_;
+    FitProgress progress_;
+};
+
+FittedParameter describe(const Parameter& parameter) {
+    FittedParameter result;
+    result.name = parameter.name;
+    for (const std::string& key : parameter.keys) {
+        result.key += (result.key.empty() ? "" : " ") + key;
+    }
+    result.unit = parameter.unit;
+    result.initial = parameter.initial / parameter.unit_factor;
+    return result;
+}
+
+// From the unit cube to the parameters' units: intervals end by end, so that on a log scale they are not symmetric; the
+// covariance by the slope at the best point (delta method).
+void fill_parameters(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Uncertainty& uncertainty) {
+    const Eigen::Index p = box.size();
+    Eigen::VectorXd slope(p);
+    for (Eigen::Index j = 0; j < p; ++j) {
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        slope[j] = box.slope(j, x[j]) / parameter.unit_factor;
+        FittedParameter fitted = describe(parameter);
+        fitted.value = box.value(j, x[j]) / parameter.unit_factor;
+        fitted.standard_error = slope[j] * std::sqrt(uncertainty.covariance(j, j));
+        fitted.lower_95 = box.value(j, uncertainty.lower_95[j]) / parameter.unit_factor;
+        fitted.upper_95 = box.value(j, uncertainty.upper_95[j]) / parameter.unit_factor;
+        fitted.at_bound = x[j] < bound_tolerance || x[j] > 1 - bound_tolerance;
+        if (fitted.at_bound) {
+            fit.message += fmt::format("'{}' stands at its {} bound. ", parameter.name, x[j] < 0.5 ? "lower" : "upper");
+        }
+        fit.parameters.push_back(fitted);
+    }
+    fit.covariance = slope.asDiagonal() * uncertainty.covariance * slope.asDiagonal();
+    const Eigen::VectorXd sd = uncertainty.covariance.diagonal().cwiseSqrt();
+    fit.correlation = uncertainty.covariance.cwiseQuotient(sd * sd.transpose());
+}
+
+void fill_runs(Fit& fit, const UnitBox& box, const std::vector<Run>& runs) {
+    for (const Run& run : runs) {
+        fit.runs.push_back(
+            {in_units(box, run.x), run.evaluation->misfit, run.evaluation->status, run.evaluation->seconds});
+    }
+}
+
+// No run to speak of: nothing is known beyond the box.
+void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
+    const Eigen::Index p = box.size();
+    const Uncertainty nothing{{},
+                              Eigen::MatrixXd::Identity(p, p) / 12.0,
+                              Eigen::VectorXd::Zero(p),
+                              Eigen::VectorXd::Ones(p),
+                              std::numeric_limits<double>::infinity(),
+                              ""};
+    fill_parameters(fit, box, box.initial(), nothing);
+    fit.misfit = nothing.reduced_chi_square;
+    fit.reduced_chi_square = nothing.reduced_chi_square;
+    fit.message += objective.runs().empty()
+                       ? "No run was made."
+                       : "No run ended well; the first: " + objective.runs().front().evaluation->status;
+}
+
+const char* explain(FitStatus status) {
+    switch (status) {
+    case FitStatus::converged:
+        return "Converged. ";
+    case FitStatus::run_limit:
+        return "All runs that optimizer.max_runs allows were used up before the end. ";
+    case FitStatus::interrupted:
+        return "Interrupted. ";
+    case FitStatus::failed:
+        return "Failed. ";
+    }
+    return "";
+}
+
+}  // namespace
+
+void FitOptions::validate() const {
+    if (threads < 0) {
+        throw InputError("fit options", "threads", std::to_string(threads), "must be 0, for one a core, or more");
+    }
+}
+
+Fit fit_study(const Study& study, const FitOptions& options) {
+    options.validate();
+    const auto begin = Clock::now();
+    const StudyModel model(study, options.forward ? options.forward : simulate_alone, options.stop_requested);
+    const UnitBox& box = model.box();
+    Reporter reporter(options, box, study.optimizer.max_runs);
+    Objective objective(
+        box.size(), [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); },
+        study.optimizer.max_runs, thread_count(options.threads), options.stop_requested,
+        [&](const Run& run) { reporter.add(run); });
+
+    // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
+    const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
+    objective.set_budget_left(study.optimizer.max_runs - reserve);
+    const SearchResult found = search(objective, study.optimizer, box.initial(), options.seed,
+                                      [&](const std::string& stage) { reporter.set_stage(stage); });
+    objective.set_budget_left(objective.budget_left() + reserve);
+
+    Fit fit;
+    fit.method = found.method;
+    fit.seed = options.seed;
+    fit.study_text = study.text;
+    if (!objective.best()) {
+        fit.status = objective.stopped() ? FitStatus::interrupted : FitStatus::failed;
+        fit.message = explain(fit.status);
+        fill_failure(fit, box, objective);
+    } else {
+        reporter.set_stage("uncertainty");
+        std::vector<std::string> names;
+        for (const Parameter& parameter : study.parameters) {
+            names.push_back(parameter.name);
+        }
+        const Uncertainty uncertainty = estimate_uncertainty(objective, model.curve_lengths(), names);
+        const Run& best = uncertainty.best;
+        fit.status = objective.stopped() ? FitStatus::interrupted
+                     : found.converged   ? FitStatus::converged
+                                         : FitStatus::run_limit;
+        fit.message = explain(fit.status);
+        fill_parameters(fit, box, best.x, uncertainty);
+        fit.message += uncertainty.message + model.remarks();
+        fit.misfit = best.evaluation->misfit;
+        fit.reduced_chi_square = uncertainty.reduced_chi_square;
+        fit.residuals = model.residuals(*best.evaluation);
+    }
+    fill_runs(fit, box, objective.runs());
+    fit.seconds = seconds_since(begin);
+    return fit;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,47 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "datasets/fit.hpp"
+#include "datasets/record.hpp"
+#include "datasets/scene.hpp"
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// Where a fit stands. One forward run is one evaluation of the whole study: every experiment's scene once.
+struct FitProgress {
+    int runs = 0;              // forward runs that have ended
+    int max_runs = 0;          // where the fit stops at the latest
+    double best_misfit = 0;    // sum of squared weighted residuals; infinite until a run has ended well
+    std::vector<double> best;  // parameters of the best run, in their units, in the study's order; empty until then
+    std::string stage;         // what is going on, in a word or two: "starts", "descent", "polish", "uncertainty"
+    double seconds = 0;        // since the fit began [s]
+};
+
+/// One simulation of one scene. `stop` is set when the user interrupts; it may be null. Called from several threads at
+/// a time.
+using Forward = std::function<Record(const Scene& scene, const std::atomic<bool>* stop)>;
+
+struct FitOptions {
+    int threads = 0;                                    // forward runs side by side; 0: one a core
+    Forward forward;                                    // empty: crampfit::simulate with one thread a run
+    std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
+    const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
+    unsigned seed = 1;                                  // of everything that is drawn at random
+
+    /// Throws InputError naming the option that is out of range.
+    void validate() const;
+};
+
+/// Adjusts the study's parameters until the simulations match the experiments.
+/// A picture or specimen file must have been read into each `scene.specimen.map` before.
+/// The result depends on the study and the seed, not on the number of threads. A forward run that fails is recorded in
+/// `Fit::runs` and the fit goes on. Throws InputError for a study that cannot be fitted as it asks, before anything
+/// runs.
+Fit fit_study(const Study& study, const FitOptions& options = {});
+
+}  // namespace crampfit

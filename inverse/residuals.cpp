@@ -1,0 +1,215 @@
+#include "inverse/residuals.hpp"
+
+#include "datasets/error.hpp"
+#include "inverse/curve.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace crampfit {
+namespace {
+
+constexpr double noise_floor =
+    0.002;  // of a curve's range: a good load cell or ruler, when nothing was said about noise
+constexpr double near_stations = 0.25e-3;  // least and largest growth between arrival stations [m]
+constexpr double far_stations = 0.5e-3;
+
+bool measured(const std::vector<double>& column) {
+    return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
+}
+
+InputError bad_data(const Experiment& experiment, const std::string& key, const std::string& value,
+                    const std::string& rule) {
+    const std::string file =
+        experiment.data_file.empty() ? "experiment " + experiment.name : experiment.data_file.string();
+    return InputError(file, key, value, rule);
+}
+
+// A displacement that turns back leaves more than one force at it. Noise may turn it back a little.
+void check_rises(const Experiment& experiment, const std::vector<double>& abscissa, const char* column) {
+    double low = INFINITY, high = -INFINITY, fall = 0;
+    for (const double value : abscissa) {
+        if (!std::isnan(value)) {
+            low = std::min(low, value);
+            high = std::max(high, value);
+            fall = std::max(fall, high - value);
+        }
+    }
+    if (high - low <= 0) {
+        throw bad_data(experiment, column, fmt::format("{:g}", low), "must rise through the test, and stands still");
+    }
+    if (fall > 0.05 * (high - low)) {
+        throw bad_data(
+            experiment, column, fmt::format("{:g} after {:g}", high - fall, high),
+            "must rise through the test, and falls by more than a twentieth of its range; fit a part that rises");
+    }
+}
+
+// Standard deviation of the rows about the line between their neighbours, robust against jumps: for white noise the
+// median of |d| is sigma sqrt(1 + s^2 + (1-s)^2) / 1.4826, with s the place between the neighbours.
+double scatter(const Curve& rows) {
+    const auto& x = rows.x();
+    const auto& y = rows.y();
+    std::vector<double> deviations;
+    for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+        const double s = (x[i] - x[i - 1]) / (x[i + 1] - x[i - 1]);
+        const double deviation = std::abs(y[i] - std::lerp(y[i - 1], y[i + 1], s));
+        deviations.push_back(deviation / std::sqrt(1 + s * s + (1 - s) * (1 - s)));
+    }
+    if (deviations.empty()) {
+        return 0;
+    }
+    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+    std::nth_element(deviations.begin(), middle, deviations.end());
+    return 1.4826 * *middle;
+}
+
+}  // namespace
+
+Comparison::Comparison(const Experiment& experiment) {
+    const Curves& data = experiment.data;
+    by_time_ = !measured(data.displacement);
+    if (by_time_ && !measured(data.time)) {
+        throw bad_data(experiment, "displacement", "absent",
+                       "a displacement or a time column is needed to compare a model with");
+    }
+    if (!measured(data.force) && !measured(data.crack_length)) {
+        throw bad_data(experiment, "force", "absent",
+                       "a force or a crack_length column is needed to compare a model with");
+    }
+    abscissa_ = by_time_ ? data.time : data.displacement;
+    abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
+    check_rises(experiment, abscissa_, by_time_ ? "time" : "displacement");
+    if (measured(data.force)) {
+        add_force_stations(experiment);
+    }
+    if (measured(data.crack_length)) {
+        add_arrival_stations(experiment);
+    }
+    if (stations_.empty()) {
+        throw bad_data(experiment, "crack_length", "constant",
+                       "must grow by more than its noise, as there is no force to compare");
+    }
+}
+
+double Comparison::noise_of(const Experiment& experiment, const char* what, const Curve& rows,
+                            const std::optional<double>& given) {
+    if (given) {
+        return *given;
+    }
+    const auto [low, high] = std::minmax_element(rows.y().begin(), rows.y().end());
+    const double range = *high > *low ? *high - *low : std::abs(*high);
+    const double sigma = std::max(scatter(rows), noise_floor * range);
+    if (!(sigma > 0)) {
+        throw bad_data(experiment, what, "0", "is zero throughout; its noise must be given");
+    }
+    const bool force = std::string(what) == "force";
+    remarks_.push_back(
+        fmt::format("{}: the noise of {} was not given; {:.3g} {} was estimated from the scatter of the rows.",
+                    experiment.name, what, force ? sigma : 1e3 * sigma, force ? "N" : "mm"));
+    return sigma;
+}
+
+double Comparison::force_at(const Curve& force, double at) const {
+    // Data and model are cut to the same range, so that near its ends they are averaged alike.
+    const double half = std::clamp(std::min(at - from_, to_ - at), 0.0, 0.5 * window_);
+    return force.mean(at - half, at + half);
+}
+
+void Comparison::add_force_stations(const Experiment& experiment) {
+    const Curve rows(abscissa_, experiment.data.force);
+    const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
+    from_ = rows.x().front();
+    to_ = rows.x().back();
+    window_ = smoothing_window * (to_ - from_);
+    const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
+    const bool sparse = static_cast<int>(rows.x().size()) <= tiles;
+    const int stations = sparse ? static_cast<int>(rows.x().size()) : tiles;
+    for (int i = 0; i < stations; ++i) {
+        const double at = sparse ? rows.x()[static_cast<std::size_t>(i)] : from_ + (i + 0.5) * window_;
+        const int averaged = sparse ? 1 : rows.count(at - 0.5 * window_, at + 0.5 * window_);
+        if (averaged == 0) {
+            continue;  // a gap in the data
+        }
+        const double slope = (rows.at(at + 0.5 * window_) - rows.at(at - 0.5 * window_)) / std::max(window_, 1e-300);
+        FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
+        station.measured = force_at(rows, at);
+        station.sigma = std::hypot(noise, slope * abscissa_noise_) / std::sqrt(averaged);
+        stations_.push_back(station);
+    }
+}
+
+void Comparison::add_arrival_stations(const Experiment& experiment) {
+    const Curve rows(abscissa_, experiment.data.crack_length);
+    const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
+    const double from = rows.x().front();
+    const double to = rows.x().back();
+    arrival_window_ = smoothing_window * (to - from);
+    const Curve crack = rows.smoothed(arrival_window_);
+    const double shortest = rows.mean(from, from + arrival_window_);
+    const double longest = rows.mean(to - arrival_window_, to);
+    const double growth = longest - shortest;
+    if (!(growth > 3 * noise)) {
+        remarks_.push_back(experiment.name +
+                           ": the crack did not grow by more than its noise; crack_length is not used.");
+        return;
+    }
+    pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
+    const double sampling = (to - from) / static_cast<double>(rows.x().size() - 1);
+    const double spacing =
+        std::max(std::min(std::clamp(growth / 24, near_stations, far_stations), growth / 2), growth / most_arrivals);
+    const std::size_t first = stations_.size();
+    for (int i = 1; shortest + i * spacing < longest; ++i) {
+        const double length = shortest + i * spacing;
+        const std::optional<double> arrival = crack.arrival(length);
+        if (!arrival) {
+            continue;
+        }
+        const int averaged =
+            std::max(1, rows.count(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
+        const double sigma_length = noise / std::sqrt(averaged);
+        const double early = crack.arrival(length - sigma_length).value_or(from);
+        const double late = crack.arrival(length + sigma_length).value_or(to);
+        FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
+        station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_ / std::sqrt(averaged)), sampling);
+        stations_.push_back(station);
+    }
+    const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());
+    for (std::size_t i = first; i < stations_.size(); ++i) {
+        const auto together = std::count_if(alone.begin(), alone.end(), [&](const FitResidual& other) {
+            return std::abs(other.measured - stations_[i].measured) <= 0.5 * arrival_window_;
+        });
+        stations_[i].sigma *= std::sqrt(static_cast<double>(together));
+    }
+}
+
+Eigen::VectorXd Comparison::modelled(const Record& record) const {
+    std::vector<double> abscissa, forces, lengths;
+    for (const Instant& instant : record.series) {
+        abscissa.push_back(by_time_ ? instant.time : instant.displacement);
+        forces.push_back(instant.force);
+        lengths.push_back(instant.crack_length);
+    }
+    Curve force(abscissa, forces);
+    if (record.status == RunStatus::split) {
+        force.continue_with(0.0);
+    }
+    const Curve crack = Curve(abscissa, lengths).smoothed(arrival_window_);
+    const double longest = *std::max_element(crack.y().begin(), crack.y().end());
+    Eigen::VectorXd values(static_cast<Eigen::Index>(stations_.size()));
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+        const FitResidual& station = stations_[i];
+        double& value = values[static_cast<Eigen::Index>(i)];
+        if (station.kind == "force") {
+            value = force_at(force, station.at);
+        } else {
+            value = crack.arrival(station.at).value_or(crack.x().back() + pace_ * (station.at - longest));
+        }
+    }
+    return values;
+}
+
+}  // namespace crampfit

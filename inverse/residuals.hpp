@@ -1,0 +1,70 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "datasets/fit.hpp"
+#include "datasets/record.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+class Curve;
+
+/// One experiment's data as stations at which a Record is compared with it.
+///
+/// Force: at displacements (at times where no displacement was measured). Explicit runs and tests vibrate, so both
+/// curves get the same moving-window average, `smoothing_window` of the measured range wide, and the stations stand one
+/// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. With no
+/// more rows than that, a station stands on each row. Latewood bands that the crack crosses one by one leave peaks some
+/// tenth of the range apart, which a fiftieth keeps.
+///
+/// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth. What the
+/// crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a; it is never
+/// below the sampling interval, so that a jump has no infinite weight, and stations reached within one window share
+/// their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
+/// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
+/// the shorter the crack.
+///
+/// Force is compared where data exist. After the end of a Record the force is 0 if the specimen split, else the last
+/// one.
+class Comparison {
+  public:
+    static constexpr double smoothing_window = 0.02;  // of the measured range
+    static constexpr int most_arrivals = 200;
+
+    /// Throws InputError, naming the data file, for data with nothing in it to compare.
+    explicit Comparison(const Experiment& experiment);
+
+    /// The stations with what was measured at them; `modelled` and `residual` are left at 0.
+    const std::vector<FitResidual>& stations() const { return stations_; }
+
+    /// What the record has at each station [stations], SI. All finite if the record's numbers are.
+    Eigen::VectorXd modelled(const Record& record) const;
+
+    /// What a person should know about how the data was used, such as noise that had to be estimated.
+    const std::vector<std::string>& remarks() const { return remarks_; }
+
+  private:
+    void add_force_stations(const Experiment& experiment);
+    void add_arrival_stations(const Experiment& experiment);
+    double noise_of(const Experiment& experiment, const char* what, const Curve& rows,
+                    const std::optional<double>& given);
+    double force_at(const Curve& force, double at) const;
+
+    bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
+    std::vector<double> abscissa_;  // measured displacement [m] or time [s], a row
+    double abscissa_noise_ = 0;     // one sigma [m] or [s]
+    double from_ = 0;               // range in which force was measured [m] or [s]
+    double to_ = 0;
+    double window_ = 0;          // of the average of force [m] or [s]
+    double arrival_window_ = 0;  // of the average of crack length [m] or [s]
+    double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
+    std::vector<FitResidual> stations_;
+    std::vector<std::string> remarks_;
+};
+
+}  // namespace crampfit

@@ -1,0 +1,195 @@
+#include "inverse/search.hpp"
+
+#include "inverse/minimize.hpp"
+#include "inverse/pool.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <random>
+#include <vector>
+
+namespace crampfit {
+namespace {
+
+constexpr int most_failed_starts = 20;
+
+using Stage = std::function<void(const std::string&)>;
+
+std::vector<Eigen::VectorXd> start_points(int count, const Eigen::VectorXd& initial, unsigned seed) {
+    std::vector<Eigen::VectorXd> points{initial};
+    for (int i = 1; i < count; ++i) {
+        points.push_back(halton(i, initial.size(), seed));
+    }
+    return points;
+}
+
+// Goes on through the sequence of starts, a few at a time, as long as all runs fail.
+void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, unsigned seed, int from) {
+    constexpr int together = 4;
+    for (int i = from; i < from + most_failed_starts && !objective.best() && !objective.exhausted(); i += together) {
+        std::vector<Eigen::VectorXd> points;
+        for (int k = 0; k < together; ++k) {
+            points.push_back(halton(i + k, initial.size(), seed));
+        }
+        objective.at(points);
+    }
+}
+
+// Where failed runs end a method before its time, a simplex method that only compares misfits goes on from the best
+// point.
+Solution descend(Objective& objective, const Eigen::VectorXd& start, const Method& method) {
+    Solution solution = minimize(objective, start, method);
+    if (!solution.converged && !objective.exhausted() && objective.best()) {
+        const std::string why = solution.message;
+        const Eigen::VectorXd best = objective.best()->x;
+        solution = minimize(objective, best, {"sbplx", method.seed});
+        solution.message = fmt::format("{} gave up ({}); sbplx went on", method.name, why);
+    }
+    return solution;
+}
+
+double reduced_chi_square(const Evaluation& evaluation, Eigen::Index parameters) {
+    return evaluation.misfit / static_cast<double>(std::max<Eigen::Index>(1, evaluation.residuals.size() - parameters));
+}
+
+// The lowest of the runs that no descent has started from or ended at yet; absent if there is none.
+std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const std::vector<Eigen::VectorXd>& seen) {
+    constexpr double far = 0.2;  // of the box
+    const Run* next = nullptr;
+    for (const Run& run : starts) {
+        const bool is_new = std::none_of(seen.begin(), seen.end(), [&](const Eigen::VectorXd& x) {
+            return (x - run.x).cwiseAbs().maxCoeff() < far;
+        });
+        if (is_new && run.evaluation->usable() && (!next || run.evaluation->misfit < next->evaluation->misfit)) {
+            next = &run;
+        }
+    }
+    return next ? std::optional(next->x) : std::nullopt;
+}
+
+SearchResult search_automatically(Objective& objective, int starts, const Eigen::VectorXd& initial, unsigned seed,
+                                  const Stage& stage) {
+    constexpr double explained = 4;  // reduced chi-square: residuals of two sigma
+    const int p = static_cast<int>(initial.size());
+    const int count = std::max(starts, 2 * p + 2);
+    stage("starts");
+    objective.at(start_points(count, initial, seed));
+    find_usable_start(objective, initial, seed, count);
+    const std::vector<Run> tried = objective.runs();
+    SearchResult result;
+    std::string ends;
+    std::vector<Eigen::VectorXd> seen;
+    stage("descent");
+    for (int i = 0; i < starts && !objective.exhausted(); ++i) {
+        const auto start = next_start(tried, seen);
+        if (!start) {
+            break;
+        }
+        const double least = objective.best()->evaluation->misfit;
+        Objective branch = objective.branch(objective.budget_left(), objective.threads());
+        const Solution solution = descend(branch, *start, {"auto", seed});
+        objective.join(branch);
+        seen.push_back(*start);
+        seen.push_back(branch.best()->x);
+        if (i == 0 || objective.best()->evaluation->misfit < least) {
+            result.converged = solution.converged;
+        }
+        ends += fmt::format(" Descent {}: {}.", i + 1, solution.message);
+        if (solution.converged && reduced_chi_square(*objective.best()->evaluation, p) < explained) {
+            break;
+        }
+    }
+    result.method = fmt::format("auto: {} starting points side by side, then steps from the best of them to the least "
+                                "misfit (Ceres) of polynomials "
+                                "fitted to the residuals of all runs nearby; from others too, up to {}, while the "
+                                "noise does not explain the misfit. "
+                                "Chosen because the misfit is a sum of squares, a run is costly, and a fit over many "
+                                "runs sees past the noise of each.{}",
+                                count, starts, ends);
+    return result;
+}
+
+SearchResult search_from_starts(Objective& objective, const Method& method, int starts, const Eigen::VectorXd& initial,
+                                const Stage& stage) {
+    stage("descent");
+    const bool global = is_global(method);
+    const std::vector<Eigen::VectorXd> points = start_points(global ? 1 : starts, initial, method.seed);
+    const int count = static_cast<int>(points.size());
+    // Shares of the budget, so that what one start does never depends on how far another has come.
+    std::vector<Objective> branches;
+    for (int i = 0; i < count; ++i) {
+        const int share = (objective.budget_left() + i) / count;
+        branches.push_back(objective.branch(share, std::max(1, objective.threads() / count)));
+    }
+    std::vector<Solution> solutions(points.size());
+    parallel_for(count, objective.threads(), [&](int i) {
+        const auto k = static_cast<std::size_t>(i);
+        Objective& branch = branches[k];
+        Eigen::VectorXd start = points[k];
+        if (!global) {
+            branch.at(start);
+            find_usable_start(branch, initial, method.seed, count + i * most_failed_starts);
+            start = branch.best() ? branch.best()->x : start;
+        }
+        solutions[k] = descend(branch, start, method);
+    });
+    SearchResult result;
+    double least = INFINITY;
+    std::string message;
+    for (std::size_t k = 0; k < branches.size(); ++k) {
+        objective.join(branches[k]);
+        const Run* best = branches[k].best();
+        if (best && best->evaluation->misfit < least) {
+            least = best->evaluation->misfit;
+            result.converged = solutions[k].converged;
+            message = solutions[k].message;
+        }
+    }
+    result.method = fmt::format("{}, as asked, from {} start{}: {}", method.name, count, count == 1 ? "" : "s",
+                                message.empty() ? "no run was usable" : message);
+    return result;
+}
+
+}  // namespace
+
+Eigen::VectorXd halton(int index, Eigen::Index dimensions, unsigned seed) {
+    // Halton (1960): the digits of the index in a prime base, mirrored at the point; another base for each dimension.
+    std::mt19937 generator(seed);
+    Eigen::VectorXd point(dimensions);
+    int base = 1;
+    for (Eigen::Index j = 0; j < dimensions; ++j) {
+        const auto is_prime = [](int n) {
+            for (int divisor = 2; divisor * divisor <= n; ++divisor) {
+                if (n % divisor == 0) {
+                    return false;
+                }
+            }
+            return true;
+        };
+        do {
+            ++base;
+        } while (!is_prime(base));
+        double value = static_cast<double>(generator()) / 4294967296.0;  // 2^32
+        double weight = 1;
+        for (int digits = index; digits > 0; digits /= base) {
+            weight /= base;
+            value += weight * (digits % base);
+        }
+        point[j] = value - std::floor(value);
+    }
+    return point;
+}
+
+SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,
+                    const Stage& stage) {
+    if (choice.method == "auto") {
+        return search_automatically(objective, choice.starts, initial, seed, stage);
+    }
+    return search_from_starts(objective, {choice.method, seed}, choice.starts, initial, stage);
+}
+
+}  // namespace crampfit

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "inverse/objective.hpp"
+
+#include <Eigen/Core>
+
+#include <functional>
+#include <string>
+
+namespace crampfit {
+
+/// How a search ended; its best point is the objective's.
+struct SearchResult {
+    bool converged = false;
+    std::string method;  // what did the work, and why it was chosen
+};
+
+/// Point `index` of a Halton sequence in the unit cube, shifted by an amount drawn from the seed [dimensions].
+Eigen::VectorXd halton(int index, Eigen::Index dimensions, unsigned seed);
+
+/// Searches the unit cube as a study asks: from `initial` and `starts - 1` further points that fill the box evenly.
+/// Local methods descend from each of them, side by side; global ones have the box for themselves; `auto` runs each of
+/// them once, descends from the best, and from others only as long as the noise does not explain the misfit. `stage` is
+/// told what is going on.
+SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,
+                    const std::function<void(const std::string&)>& stage);
+
+}  // namespace crampfit

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+
+namespace crampfit {
+
+/// Throws InputError for a study that cannot be fitted whatever the runs give, or that asks for what is not there yet.
+void check_study(const Study& study);
+
+}  // namespace crampfit

@@ -1,0 +1,182 @@
+#include "inverse/uncertainty.hpp"
+
+#include "inverse/directions.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crampfit {
+namespace {
+
+// 1 + 2 sum rho_k, rho_k the autocorrelation of residuals at distance k, up to the first that chance explains.
+double correlation_time(const Eigen::VectorXd& r) {
+    const Eigen::Index n = r.size();
+    const double chance = 1.64 / std::sqrt(static_cast<double>(n));
+    double time = 1;
+    for (Eigen::Index k = 1; k < n / 2; ++k) {
+        const double rho = r.head(n - k).dot(r.tail(n - k)) / r.squaredNorm();
+        if (!(rho > chance)) {
+            break;
+        }
+        time += 2 * rho;
+    }
+    return time;
+}
+
+// Mean over the curves, by their lengths.
+double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>& curve_lengths) {
+    double sum = 0;
+    Eigen::Index begin = 0;
+    for (const int length : curve_lengths) {
+        sum += length * correlation_time(residuals.segment(begin, length));
+        begin += length;
+    }
+    return begin > 0 ? sum / static_cast<double>(begin) : 1.0;
+}
+
+/// Names what cannot be told, and remembers whose intervals are the whole box for it.
+class Undetermined {
+  public:
+    explicit Undetermined(const std::vector<std::string>& names) : names_(names), is_member_(names.size(), false) {}
+
+    void add(const Eigen::VectorXd& direction) {
+        std::vector<std::string> members;
+        for (std::size_t j = 0; j < names_.size(); ++j) {
+            if (std::abs(direction[static_cast<Eigen::Index>(j)]) > 0.1 * direction.cwiseAbs().maxCoeff()) {
+                members.push_back("'" + names_[j] + "'");
+                is_member_[j] = true;
+            }
+        }
+        message_ += members.size() == 1
+                        ? members.front() + " cannot be told from this data. "
+                        : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
+    }
+
+    bool contains(Eigen::Index j) const { return is_member_[static_cast<std::size_t>(j)]; }
+    const std::string& message() const { return message_; }
+
+  private:
+    const std::vector<std::string>& names_;
+    std::vector<bool> is_member_;
+    std::string message_;
+};
+
+// s (J^T J)^-1, direction by direction; an undetermined one gets the variance of a uniform distribution over the box.
+Eigen::MatrixXd data_covariance(const Directions& directions, double widening, Undetermined& undetermined) {
+    const Eigen::Index p = directions.scale.size();
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
+    for (Eigen::Index k = 0; k < p; ++k) {
+        const Eigen::VectorXd direction = directions.scale.cwiseProduct(directions.v.col(k));
+        const double largest = direction.cwiseAbs().maxCoeff();
+        const double singular = directions.singular[k];
+        if (directions.resolved(k) && 4 * std::sqrt(widening) * largest < singular) {
+            covariance += widening * direction * direction.transpose() / (singular * singular);
+        } else {
+            covariance += direction * direction.transpose() / (12 * largest * largest);
+            undetermined.add(direction);
+        }
+    }
+    return covariance;
+}
+
+// How the model's noise moves the best run: by each run's scatter, and off the lowest point of the polynomial.
+Eigen::MatrixXd model_covariance(const Directions& directions) {
+    const Eigen::Index p = directions.scale.size();
+    const LocalModel& model = directions.model;
+    const Eigen::VectorXd off = lowest_point(model, directions.best.x, 1.5 * directions.radius) - directions.best.x;
+    Eigen::MatrixXd covariance = off * off.transpose();
+    if (model.freedom() > 0) {
+        Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(p, model.scatter().cols());
+        for (Eigen::Index k = 0; k < p; ++k) {
+            if (directions.resolved(k)) {
+                moved += directions.scale.cwiseProduct(directions.v.col(k)) *
+                         (directions.u.col(k).transpose() * model.scatter()) / directions.singular[k];
+            }
+        }
+        covariance += moved * moved.transpose() / model.freedom();
+    }
+    return covariance;
+}
+
+}  // namespace
+
+double student_975(int degrees_of_freedom) {
+    // Abramowitz and Stegun (1964), 26.7.3 and 26.7.4: P(|T| < t) as a finite sum in cos(theta), theta = atan(t /
+    // sqrt(n)).
+    const int n = degrees_of_freedom;
+    const auto inside = [n](double t) {
+        const double theta = std::atan(t / std::sqrt(n));
+        const double cosine = std::cos(theta);
+        const bool odd = n % 2 == 1;
+        double term = odd ? cosine : 1.0;
+        double sum = n > 1 ? term : 0.0;
+        for (int k = odd ? 3 : 2; k < n - 1; k += 2) {
+            term *= cosine * cosine * (k - 1) / k;
+            sum += term;
+        }
+        return odd ? 2 / std::numbers::pi * (theta + std::sin(theta) * sum) : std::sin(theta) * sum;
+    };
+    double low = 1.9, high = 13.0;  // from the normal distribution to one degree of freedom
+    while (high - low > 1e-9) {
+        const double middle = 0.5 * (low + high);
+        (inside(middle) < 0.95 ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
+                                 const std::vector<std::string>& names) {
+    const auto directions = directions_about_best(objective);
+    Uncertainty result;
+    result.best = *objective.best();
+    const Eigen::VectorXd& x = result.best.x;
+    const Eigen::VectorXd& residuals = result.best.evaluation->residuals;
+    const int p = static_cast<int>(x.size());
+    const int count = static_cast<int>(residuals.size());
+    result.reduced_chi_square = result.best.evaluation->misfit / std::max(1, count - p);
+    result.lower_95 = Eigen::VectorXd::Zero(p);
+    result.upper_95 = Eigen::VectorXd::Ones(p);
+    if (!directions) {
+        result.covariance = Eigen::MatrixXd::Identity(p, p) / 12.0;
+        result.message =
+            "Too few runs ended well near the best one to tell how sure it is: the intervals are the whole box. ";
+        return result;
+    }
+    const double time = correlation_time(residuals, curve_lengths);
+    const double widening = std::max(1.0, result.reduced_chi_square * time);
+    int independent = count;
+    if (widening > 1) {
+        independent = static_cast<int>(count / time);
+        result.message += fmt::format("Standard errors are widened by {:.3g}: the misfit is {:.3g} times what the "
+                                      "noise explains, and {:.3g} neighbouring "
+                                      "residuals count as one. ",
+                                      std::sqrt(widening), result.reduced_chi_square, time);
+    }
+    Undetermined undetermined(names);
+    result.covariance = data_covariance(*directions, widening, undetermined);
+    const Eigen::MatrixXd own = model_covariance(*directions);
+    result.covariance += own;
+    result.message += undetermined.message();
+    const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
+    if (share > 0.1) {
+        result.message +=
+            fmt::format("The model's own scatter from run to run, and the best run's distance from the lowest "
+                        "point of the fit through its neighbours, make up to {:.0f} % of a variance. ",
+                        100 * share);
+    }
+    const double t = student_975(std::max(1, independent - p));
+    for (Eigen::Index j = 0; j < p; ++j) {
+        if (!undetermined.contains(j)) {
+            const double half = t * std::sqrt(result.covariance(j, j));
+            result.lower_95[j] = std::max(0.0, x[j] - half);
+            result.upper_95[j] = std::min(1.0, x[j] + half);
+        }
+    }
+    return result;
+}
+
+}  // namespace crampfit

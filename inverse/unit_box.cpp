@@ -1,0 +1,38 @@
+#include "inverse/unit_box.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+double UnitBox::value(Eigen::Index j, double x) const {
+    const Parameter& p = parameter(j);
+    const double value =
+        p.scale == Scale::logarithmic ? p.lower * std::pow(p.upper / p.lower, x) : p.lower + x * (p.upper - p.lower);
+    return std::clamp(value, p.lower, p.upper);
+}
+
+double UnitBox::slope(Eigen::Index j, double x) const {
+    const Parameter& p = parameter(j);
+    return p.scale == Scale::logarithmic ? value(j, x) * std::log(p.upper / p.lower) : p.upper - p.lower;
+}
+
+Eigen::VectorXd UnitBox::values(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd result(size());
+    for (Eigen::Index j = 0; j < size(); ++j) {
+        result[j] = value(j, x[j]);
+    }
+    return result;
+}
+
+Eigen::VectorXd UnitBox::initial() const {
+    Eigen::VectorXd x(size());
+    for (Eigen::Index j = 0; j < size(); ++j) {
+        const Parameter& p = parameter(j);
+        x[j] = p.scale == Scale::logarithmic ? std::log(p.initial / p.lower) / std::log(p.upper / p.lower)
+                                             : (p.initial - p.lower) / (p.upper - p.lower);
+    }
+    return x;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,110 @@
+#include "datasets/io.hpp"
+#include "tests/cli/command.hpp"
+#include "tests/cli/scenes.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+using namespace crampfit;
+
+namespace {
+
+/// A study that looks for the E with which `small_scene` was run to make its data.
+std::string study(int max_runs) {
+    return fmt::format(R"(
+title = "E of a block"
+
+[[experiments]]
+name = "pull"
+scene = "scene.toml"
+data = "pull.csv"
+noise = {{ force = "0.5 N" }}
+
+[[parameters]]
+name = "EW stiffness"
+key = "materials.EW.E"
+initial = "60 MPa"
+lower = "10 MPa"
+upper = "100 MPa"
+scale = "log"
+
+[optimizer]
+starts = 1
+max_runs = {}
+)",
+                       max_runs);
+}
+
+/// Runs the scene and writes its force and displacement as the test's data.
+void make_data(Command& command) {
+    command.folder.write("scene.toml", small_scene);
+    ASSERT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("truth.h5")}).status, 0);
+    Curves curves;
+    for (const Instant& instant : read_record(command.path("truth.h5")).series) {
+        curves.displacement.push_back(instant.displacement);
+        curves.force.push_back(instant.force);
+    }
+    write_curves(curves, command.path("pull.csv"));
+}
+
+} // namespace
+
+TEST(SystemCommand, FitFindsWhatMadeTheData) {
+    Command command;
+    make_data(command);
+    command.folder.write("study.toml", study(60));
+    const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_TRUE(contains(outcome.out, "EW stiffness")) << outcome.out;
+    EXPECT_TRUE(contains(outcome.out, "95 % interval")) << outcome.out;
+
+    const Fit fit = read_fit(command.path("fit.h5"));
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    ASSERT_EQ(fit.parameters.size(), 1u);
+    // The data come from the model itself and carry no noise: what is left is where the search ends.
+    EXPECT_NEAR(fit.parameters.front().value, 40.0, 0.4);
+    EXPECT_EQ(fit.parameters.front().unit, "MPa");
+
+    const Outcome table = command.run({"csv", command.path("fit.h5"), "parameters"});
+    EXPECT_EQ(table.out.rfind("name,key,value,unit,standard_error,lower_95,upper_95,initial,at_bound\n"
+                              "EW stiffness,materials.EW.E,",
+                              0),
+              0u)
+        << table.out;
+}
+
+TEST(SystemCommand, FitThatRunsOutOfRunsIsSavedWithStatusOne) {
+    Command command;
+    make_data(command);
+    command.folder.write("study.toml", study(2));
+    const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5"), "--quiet"});
+    EXPECT_EQ(outcome.status, 1) << outcome.error;
+    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(read_fit(command.path("fit.h5")).status, FitStatus::run_limit);
+}
+
+TEST(SystemCommand, InterruptedFitIsSaved) {
+    Command command;
+    make_data(command);
+    command.folder.write("scene.toml", endless_scene);
+    command.folder.write("study.toml", study(60));
+    command.start({"fit", command.path("study.toml"), "-o", command.path("fit.h5"), "--log", command.path("log.txt")});
+    EXPECT_TRUE(command.wait_for("log.txt", "study is read"));
+    command.send(SIGINT);
+    const Outcome outcome = command.finish();
+    EXPECT_EQ(outcome.status, 130) << outcome.error;
+    EXPECT_EQ(read_fit(command.path("fit.h5")).status, FitStatus::interrupted);
+}
+
+TEST(SystemCommand, BadStudyIsStatusTwoAndNamesFileAndKey) {
+    Command command;
+    make_data(command);
+    command.folder.write("study.toml", study(60) + "\nbest = true\n");
+    const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.error.rfind("crampfit: error: ", 0), 0u) << outcome.error;
+    EXPECT_TRUE(contains(outcome.error, "study.toml: optimizer.best")) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(command.path("fit.h5")));
+}

@@ -1,0 +1,240 @@
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "tests/datasets/good_scenes.hpp"
+#include "tests/temporary_folder.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace crampfit;
+
+namespace {
+
+const std::string good_study = R"(title = "EW and LW toughness from two tests"
+
+[[experiments]]
+name = "wedge 1"
+scene = "wedge.toml"
+data = "wedge_1.csv"
+noise = { force = "200 mN", crack_length = "0.1 mm" }
+weight = 2.0
+
+[[experiments]]
+scene = "plain.toml"
+data = "plain.csv"
+
+[[parameters]]
+name = "EW toughness"
+key = "materials.EW.toughness"
+initial = "80 J/m^2"
+lower = "0.02 kJ/m^2"
+upper = "400 N/m"
+scale = "log"
+prior = { mean = "100 J/m^2", sd = "30 J/m^2" }
+
+[[parameters]]
+name = "stiffness"
+keys = ["materials.EW.E", "materials.LW.E"]
+initial = "50 MPa"
+lower = "1 MPa"
+upper = "2 GPa"
+
+[[parameters]]
+key = "materials.EW.nu"
+initial = 0.3
+lower = 0
+upper = 0.4
+
+[optimizer]
+method = "bobyqa"
+starts = 4
+max_runs = 200
+
+[uncertainty]
+profile = true
+posterior = 2000
+)";
+
+struct StudyFolder : TemporaryFolder {
+    StudyFolder() {
+        write("wedge.toml", ring_scene);
+        write("plain.toml", plain_scene);
+        write("wedge_1.csv", "displacement [mm],force [N],crack_length [mm]\n0,0,1\n0.1,5,1\n");
+        write("plain.csv", "time [s],force [N]\n0,0\n1,5\n");
+    }
+    Study read(const std::string& text, const Overrides& overrides = {}) const {
+        return read_study(write("study.toml", text), overrides);
+    }
+};
+
+template <class Call>
+void expect_error(const std::string& file, const std::string& key, const std::string& phrase, const Call& call) {
+    try {
+        call();
+        FAIL() << "no error; expected one at " << key << " with: " << phrase;
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.file, file) << error.what();
+        EXPECT_EQ(error.key, key) << error.what();
+        EXPECT_NE(error.rule.find(phrase), std::string::npos) << error.what();
+    }
+}
+
+}  // namespace
+
+TEST(UnitStudy, Read) {
+    const StudyFolder folder;
+    const Study study = folder.read(good_study);
+    EXPECT_EQ(study.title, "EW and LW toughness from two tests");
+    EXPECT_EQ(study.text, good_study);
+    ASSERT_EQ(study.experiments.size(), 2U);
+    const Experiment& wedge = study.experiments[0];
+    EXPECT_EQ(wedge.name, "wedge 1");
+    EXPECT_EQ(wedge.scene.title, "TR+ crack under tension");
+    EXPECT_EQ(wedge.data_file, folder / "wedge_1.csv");
+    EXPECT_DOUBLE_EQ(wedge.data.displacement[1], 1e-4);
+    EXPECT_DOUBLE_EQ(*wedge.noise.force, 0.2);
+    EXPECT_DOUBLE_EQ(*wedge.noise.crack_length, 1e-4);
+    EXPECT_FALSE(wedge.noise.time);
+    EXPECT_EQ(wedge.weight, 2);
+    EXPECT_EQ(study.experiments[1].name, "experiment 1");
+    EXPECT_EQ(study.experiments[1].weight, 1);
+    ASSERT_EQ(study.parameters.size(), 3U);
+    const Parameter& toughness = study.parameters[0];
+    EXPECT_EQ(toughness.keys, std::vector<std::string>{"materials.EW.toughness"});
+    EXPECT_DOUBLE_EQ(toughness.initial, 80);
+    EXPECT_DOUBLE_EQ(toughness.lower, 20);
+    EXPECT_DOUBLE_EQ(toughness.upper, 400);
+    EXPECT_EQ(toughness.unit, "J/m^2");
+    EXPECT_EQ(toughness.scale, Scale::logarithmic);
+    EXPECT_DOUBLE_EQ(toughness.prior->sd, 30);
+    EXPECT_EQ(study.parameters[1].keys.size(), 2U);
+    EXPECT_EQ(study.parameters[1].unit, "MPa");
+    EXPECT_DOUBLE_EQ(study.parameters[1].unit_factor, 1e6);
+    EXPECT_DOUBLE_EQ(study.parameters[1].upper, 2e9);
+    EXPECT_EQ(study.parameters[1].scale, Scale::linear);
+    EXPECT_EQ(study.parameters[2].name, "materials.EW.nu");
+    EXPECT_EQ(study.parameters[2].unit, "");
+    EXPECT_EQ(study.parameters[2].unit_factor, 1);
+    EXPECT_EQ(study.optimizer.method, "bobyqa");
+    EXPECT_EQ(study.optimizer.starts, 4);
+    EXPECT_EQ(study.optimizer.max_runs, 200);
+    EXPECT_TRUE(study.uncertainty.profile);
+    EXPECT_EQ(study.uncertainty.posterior, 2000);
+}
+
+TEST(UnitStudy, OverridesOfTheStudyAndOfItsScenes) {
+    const StudyFolder folder;
+    const Study study = folder.read(good_study, {{"optimizer.starts", "7"},
+                                                 {"parameters.EW toughness.initial", "90 J/m^2"},
+                                                 {"experiments.experiment 1.weight", "3"},
+                                                 {"materials.EW.density", "333 kg/m^3"}});
+    EXPECT_EQ(study.optimizer.starts, 7);
+    EXPECT_DOUBLE_EQ(study.parameters[0].initial, 90);
+    EXPECT_EQ(study.experiments[1].weight, 3);
+    for (const Experiment& experiment : study.experiments) {
+        EXPECT_DOUBLE_EQ(experiment.scene.materials.at("EW").density, 333);
+    }
+    expect_error("command line (--set)", "optimizer.starts", "whole number", [&] {
+        folder.read(good_study, {{"optimizer.starts", "0"}});
+    });
+    expect_error("command line (--set)", "materials.EW.E", "missing unit", [&] {
+        folder.read(good_study, {{"materials.EW.E", "1"}});
+    });
+    expect_error("command line (--set)", "optimiser.starts", "unknown key", [&] {
+        folder.read(good_study, {{"optimiser.starts", "1"}});
+    });
+}
+
+TEST(UnitStudy, WhatIsWrongIsSaid) {
+    const StudyFolder folder;
+    struct Bad {
+        std::string from, to, key, phrase;
+    };
+    const std::vector<Bad> table{
+        {"[optimizer]", "[optimiser]", "optimiser", "did you mean \"optimizer\"?"},
+        {"weight", "wieght", "experiments.wedge 1.wieght", "did you mean \"weight\"?"},
+        {"scale", "scales", "parameters.EW toughness.scales", "did you mean \"scale\"?"},
+        {"starts", "start", "optimizer.start", "did you mean \"starts\"?"},
+        {"profile", "profiles", "uncertainty.profiles", "did you mean \"profile\"?"},
+        {"sd =", "sigma =", "parameters.EW toughness.prior.sigma", "unknown key"},
+        {"noise = { force", "noise = { forces", "experiments.wedge 1.noise.forces", "did you mean \"force\"?"},
+        {"scene = \"wedge.toml\"", "", "experiments.wedge 1.scene", "missing"},
+        {"\"wedge.toml\"", "\"none.toml\"", "experiments.wedge 1.scene", "no such file"},
+        {"data = \"plain.csv\"", "", "experiments.experiment 1.data", "missing"},
+        {"\"plain.csv\"", "\"none.csv\"", "experiments.experiment 1.data", "no such file"},
+        {"\"200 mN\"", "\"200 mm\"", "experiments.wedge 1.noise.force", "wrong dimension"},
+        {"\"200 mN\"", "0.2", "experiments.wedge 1.noise.force", "missing unit"},
+        {"\"200 mN\"", "\"0 N\"", "experiments.wedge 1.noise.force", "greater than 0"},
+        {"noise = { force = \"200 mN\"", "noise = { time = \"1 s\"", "experiments.wedge 1.noise.time",
+         "no such column"},
+        {"weight = 2.0", "weight = 0", "experiments.wedge 1.weight", "greater than 0"},
+        {"scene = \"plain.toml\"", "name = \"wedge 1\"\nscene = \"plain.toml\"", "experiments.wedge 1", "is taken"},
+        {"key = \"materials.EW.toughness\"", "", "parameters.EW toughness", "give one of key and keys"},
+        {"key = \"materials.EW.toughness\"", "key = \"materials.EW.tougness\"", "parameters.EW toughness.key",
+         "did you mean \"toughness\"?"},
+        {"key = \"materials.EW.toughness\"", "key = \"materials.XX.toughness\"", "parameters.EW toughness.key",
+         "there is no material XX"},
+        {"[\"materials.EW.E\", \"materials.LW.E\"]", "[\"materials.EW.E\", \"materials.LW.nu\"]",
+         "parameters.stiffness.keys.1", "one dimension"},
+        {"[\"materials.EW.E\", \"materials.LW.E\"]", "[]", "parameters.stiffness.keys", "at least one key"},
+        {"initial = \"80 J/m^2\"", "initial = 80", "parameters.EW toughness.initial", "missing unit"},
+        {"initial = \"80 J/m^2\"", "initial = \"80 MPa\"", "parameters.EW toughness.initial", "wrong dimension"},
+        {"initial = \"80 J/m^2\"", "", "parameters.EW toughness.initial", "missing key"},
+        {"initial = \"80 J/m^2\"", "initial = \"10 J/m^2\"", "parameters.EW toughness.initial",
+         "between lower and upper"},
+        {"initial = \"80 J/m^2\"", "initial = \"500 J/m^2\"", "parameters.EW toughness.initial",
+         "between lower and upper"},
+        {"upper = \"400 N/m\"", "upper = \"20 J/m^2\"", "parameters.EW toughness.lower", "less than upper"},
+        {"lower = \"0.02 kJ/m^2\"", "lower = \"0 J/m^2\"", "parameters.EW toughness.lower", "greater than 0"},
+        {"upper = 0.4", "upper = 0.5\nscale = \"linear\"", "parameters.2.upper", "between -1 and 0.5"},
+        {"upper = 0.4", "upper = 0.4\nscale = \"log\"", "parameters.2.lower", "log scale"},
+        {"scale = \"log\"", "scale = \"ln\"", "parameters.EW toughness.scale", "must be one of"},
+        {"sd = \"30 J/m^2\"", "sd = \"0 J/m^2\"", "parameters.EW toughness.prior.sd", "greater than 0"},
+        {"mean = \"100 J/m^2\", ", "", "parameters.EW toughness.prior.mean", "missing"},
+        {"name = \"stiffness\"", "name = \"EW toughness\"", "parameters.EW toughness", "is taken"},
+        {"key = \"materials.EW.nu\"", "key = \"materials.EW.E\"", "parameters.2.initial", "missing unit"},
+        {"keys = [\"materials.EW.E\"", "keys = [\"materials.EW.toughness\"", "parameters.stiffness.keys.1",
+         "one dimension"},
+        {"\"bobyqa\"", "\"bobyka\"", "optimizer.method", "did you mean \"bobyqa\"?"},
+        {"starts = 4", "starts = 0", "optimizer.starts", "whole number from 1"},
+        {"max_runs = 200", "max_runs = 0", "optimizer.max_runs", "whole number from 1"},
+        {"profile = true", "profile = 1", "uncertainty.profile", "true or false"},
+        {"posterior = 2000", "posterior = -1", "uncertainty.posterior", "whole number from 0"},
+        {"[optimizer]", "[sensitivity]\nmethod = \"sobol\"\n[optimizer]", "sensitivity", "not supported yet"},
+        {"title =", "outputs = [\"peak force\"]\ntitle =", "outputs", "not supported yet"},
+        {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "not supported yet"},
+        {"title =", "title = = ", "", "line 1"},
+    };
+    for (const Bad& bad : table) {
+        SCOPED_TRACE("'" + bad.from + "' -> '" + bad.to + "'");
+        std::string text = good_study;
+        ASSERT_NE(text.find(bad.from), std::string::npos);
+        text.replace(text.find(bad.from), bad.from.size(), bad.to);
+        expect_error((folder / "study.toml").string(), bad.key, bad.phrase, [&] { folder.read(text); });
+    }
+    const std::size_t experiments = good_study.find("[[experiments]]");
+    const std::size_t parameters = good_study.find("[[parameters]]");
+    const std::size_t optimizer = good_study.find("[optimizer]");
+    expect_error((folder / "study.toml").string(), "experiments", "missing",
+                 [&] { folder.read(good_study.substr(parameters)); });
+    expect_error((folder / "study.toml").string(), "parameters", "missing", [&] {
+        folder.read(good_study.substr(experiments, parameters - experiments) + good_study.substr(optimizer));
+    });
+    expect_error((folder / "study.toml").string(), "parameters", "at least one",
+                 [&] { folder.read("parameters = []\n" + good_study.substr(experiments, parameters - experiments)); });
+}
+
+TEST(UnitStudy, OneKeyInTwoParameters) {
+    const StudyFolder folder;
+    const std::string twice = "\n[[parameters]]\nname = \"again\"\nkey = \"materials.LW.E\"\ninitial = \"2 MPa\"\n"
+                              "lower = \"1 MPa\"\nupper = \"3 MPa\"\n";
+    expect_error((folder / "study.toml").string(), "parameters.again", "belongs to the parameter \"stiffness\" already",
+                 [&] { folder.read(good_study + twice); });
+}
+
+TEST(UnitStudy, ErrorsOfItsFilesNameThoseFiles) {
+    const StudyFolder folder;
+    folder.write("plain.csv", "force [N]\nx\n");
+    expect_error((folder / "plain.csv").string(), "force, line 2", "finite number", [&] { folder.read(good_study); });
+    folder.write("wedge.toml", "title = 3");
+    expect_error((folder / "wedge.toml").string(), "title", "must be a text", [&] { folder.read(good_study); });
+}

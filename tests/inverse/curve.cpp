@@ -1,0 +1,77 @@
+#include "inverse/curve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using crampfit::Curve;
+
+namespace {
+
+const double nan_ = std::nan("");
+
+TEST(UnitCurve, SortsRowsSkipsGapsAndAveragesEqualPlaces) {
+    const std::vector<double> x{2, 0, 1, 1, 3, nan_, 4};
+    const std::vector<double> y{20, 0, 8, 12, nan_, 7, 40};
+    const Curve curve(x, y);
+    EXPECT_EQ(curve.x(), (std::vector<double>{0, 1, 2, 4}));
+    EXPECT_EQ(curve.y(), (std::vector<double>{0, 10, 20, 40}));
+}
+
+TEST(UnitCurve, InterpolatesAndContinuesItsEnds) {
+    Curve curve(std::vector<double>{1, 2}, std::vector<double>{10, 30});
+    EXPECT_DOUBLE_EQ(curve.at(1.25), 15);
+    EXPECT_DOUBLE_EQ(curve.at(0), 10);
+    EXPECT_DOUBLE_EQ(curve.at(5), 30);
+    curve.continue_with(0);
+    EXPECT_DOUBLE_EQ(curve.at(2), 30);
+    EXPECT_DOUBLE_EQ(curve.at(5), 0);
+    EXPECT_DOUBLE_EQ(curve.mean(1, 3), 10);  // area 20 under the line, then nothing
+}
+
+// The average is the exact integral of the polygon, so it does not depend on how the rows lie.
+TEST(UnitCurve, MeanIsTheIntegralOfThePolygon) {
+    const Curve coarse(std::vector<double>{0, 1, 3}, std::vector<double>{0, 4, 0});
+    const Curve fine(std::vector<double>{0, 0.3, 1, 1.7, 2.2, 3}, std::vector<double>{0, 1.2, 4, 2.6, 1.6, 0});
+    EXPECT_NEAR(coarse.mean(0.5, 2), (0.5 * (2 + 4) * 0.5 + 0.5 * (4 + 2)) / 1.5, 1e-14);
+    EXPECT_NEAR(coarse.mean(0.1, 2.9), fine.mean(0.1, 2.9), 1e-14);
+    EXPECT_DOUBLE_EQ(coarse.mean(2, 2), coarse.at(2));
+    EXPECT_EQ(fine.count(0.3, 1.7), 2);
+}
+
+TEST(UnitCurve, SmoothingKeepsAStraightLineUpToItsEnds) {
+    std::vector<double> x, y;
+    for (int i = 0; i <= 100; ++i) {
+        x.push_back(0.01 * i);
+        y.push_back(3 - 2 * x.back());
+    }
+    const Curve smooth = Curve(x, y).smoothed(0.2);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        EXPECT_NEAR(smooth.y()[i], y[i], 1e-13);
+    }
+}
+
+TEST(UnitCurve, SmoothingTakesOutAVibrationOfItsOwnPeriod) {
+    std::vector<double> x, y;
+    for (int i = 0; i <= 1000; ++i) {
+        x.push_back(0.001 * i);
+        y.push_back(std::sin(2 * M_PI * x.back() / 0.1));
+    }
+    const Curve smooth = Curve(x, y).smoothed(0.1);
+    EXPECT_NEAR(smooth.at(0.525), 0, 1e-3);  // a whole period in the window; the polygon is that far from a sine
+}
+
+TEST(UnitCurve, ArrivalOfARisingCurveIsItsInverse) {
+    const Curve curve(std::vector<double>{0, 1, 2, 3}, std::vector<double>{0, 1, 5, 6});
+    EXPECT_DOUBLE_EQ(*curve.arrival(3), 1.5);
+    EXPECT_DOUBLE_EQ(*curve.arrival(1), 1);
+    EXPECT_DOUBLE_EQ(*curve.arrival(-1), 0);
+    EXPECT_FALSE(curve.arrival(6.5));
+}
+
+TEST(UnitCurve, ArrivalOfANoisyCurveLiesMidway) {
+    const Curve curve(std::vector<double>{0, 1, 2, 3, 4}, std::vector<double>{0, 2, 0, 2, 4});
+    EXPECT_DOUBLE_EQ(*curve.arrival(1), 1.5);  // first reached at 0.5, last below at 2.5
+}
+
+}  // namespace

@@ -1,0 +1,308 @@
+#include "inverse/fit.hpp"
+#include "datasets/error.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+namespace crampfit::testing {
+namespace {
+
+TEST(SystemFit, CeresRecoversParametersFromNoiseFreeData) {
+    FakeWedge smooth;
+    smooth.sharpness = 1;
+    Study study = wedge_study(smooth);
+    study.optimizer.method = "ceres";
+    const Fit fit = fit_study(study, with(smooth, 2));
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    EXPECT_NEAR(fit.parameters[0].value / true_earlywood, 1, 1e-6);
+    EXPECT_NEAR(fit.parameters[1].value / true_latewood, 1, 1e-6);
+    EXPECT_LT(fit.misfit, 1e-6);
+}
+
+TEST(SystemFit, AutoIsEconomicalWithAndWithoutNoiseOfTheModel) {
+    const FakeWedge wedge;
+    for (const double noise : {0.0, 0.05}) {
+        Study study = wedge_study(wedge, 0.02, 1e-4, 3);
+        FitOptions options = with(wedge, 2);
+        options.forward = noisy(wedge, noise);
+        const Fit fit = fit_study(study, options);
+        EXPECT_EQ(fit.status, FitStatus::converged);
+        EXPECT_LE(fit.runs.size(), 60u);
+        EXPECT_NEAR(fit.parameters[0].value / true_earlywood, 1, 0.03);
+        EXPECT_NEAR(fit.parameters[1].value / true_latewood, 1, 0.03);
+        EXPECT_LT(fit.reduced_chi_square, 2);
+    }
+}
+
+TEST(SystemFit, ReportsWhatItDid) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.parameters[0].unit = "kJ/m^2";
+    study.parameters[0].unit_factor = 1000;
+    study.text = "the study";
+    int calls = 0;
+    FitProgress last;
+    FitOptions options = with(wedge);
+    options.progress = [&](const FitProgress& progress) {
+        EXPECT_EQ(progress.runs, ++calls);
+        last = progress;
+    };
+    const Fit fit = fit_study(study, options);
+    EXPECT_EQ(static_cast<std::size_t>(calls), fit.runs.size());
+    EXPECT_EQ(last.best_misfit, fit.misfit);
+    EXPECT_EQ(last.best, (std::vector<double>{fit.parameters[0].value, fit.parameters[1].value}));
+    EXPECT_NEAR(fit.parameters[0].value, 0.11, 0.005);
+    EXPECT_NEAR(fit.parameters[0].initial, 0.08, 1e-12);
+    EXPECT_EQ(fit.parameters[0].key, "materials.EW.toughness");
+    EXPECT_LT(fit.parameters[0].lower_95, fit.parameters[0].value);
+    EXPECT_GT(fit.parameters[0].upper_95, fit.parameters[0].value);
+    EXPECT_NEAR(fit.covariance(0, 0), std::pow(fit.parameters[0].standard_error, 2), 1e-12);
+    EXPECT_NEAR(fit.correlation(1, 1), 1, 1e-12);
+    EXPECT_EQ(fit.runs[0].status, "finished");
+    EXPECT_NEAR(fit.runs[0].parameters[1], 250, 1e-9);
+    EXPECT_EQ(fit.study_text, "the study");
+    double sum = 0;
+    for (const FitResidual& residual : fit.residuals) {
+        sum += residual.residual * residual.residual;
+    }
+    EXPECT_NEAR(sum, fit.misfit, 1e-9 * fit.misfit);
+}
+
+class EveryMethod : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(EveryMethod, GivesTheSameBitsForAnyNumberOfThreads) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.optimizer = {.method = GetParam(), .starts = 3, .max_runs = 60};
+    FitOptions options;
+    options.forward = [noise = noisy(wedge, 0.03)](const Scene& scene, const std::atomic<bool>* stop) {
+        if (scramble(scene.materials.at("EW").toughness, 1) < 0.1) {
+            throw std::runtime_error("lost");
+        }
+        return noise(scene, stop);
+    };
+    options.threads = 1;
+    const Fit one = fit_study(study, options);
+    for (const int threads : {2, 4}) {
+        options.threads = threads;
+        const Fit more = fit_study(study, options);
+        ASSERT_EQ(more.runs.size(), one.runs.size());
+        for (std::size_t i = 0; i < one.runs.size(); ++i) {
+            EXPECT_EQ(more.runs[i].parameters, one.runs[i].parameters);
+            EXPECT_EQ(more.runs[i].misfit, one.runs[i].misfit);
+            EXPECT_EQ(more.runs[i].status, one.runs[i].status);
+        }
+        EXPECT_EQ(more.covariance, one.covariance);
+        EXPECT_EQ(more.parameters[0].lower_95, one.parameters[0].lower_95);
+        EXPECT_EQ(more.message, one.message);
+        EXPECT_EQ(more.method, one.method);
+    }
+    EXPECT_LE(one.runs.size(), 60u);
+    std::set<std::vector<double>> distinct;
+    for (const FitRun& run : one.runs) {
+        EXPECT_TRUE(distinct.insert(run.parameters).second) << "run twice";
+        EXPECT_GE(run.misfit, one.misfit);  // the best ever seen is the one that is given
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(SystemFit, EveryMethod,
+                         ::testing::Values("auto", "ceres", "bobyqa", "sbplx", "cobyla", "neldermead", "crs2", "isres",
+                                           "direct", "mlsl"),
+                         [](const auto& test) { return test.param; });
+
+TEST(SystemFit, FailedRunsOfEveryKindAreRecordedAndTheFitGoesOn) {
+    const FakeWedge wedge;
+    const Study study = wedge_study(wedge, 0.02, 1e-4);
+    FitOptions options = with(wedge, 2);
+    options.forward = [wedge](const Scene& scene, const std::atomic<bool>*) {
+        Record record = wedge(scene);
+        const double draw = scramble(scene.materials.at("EW").toughness, scene.materials.at("LW").toughness);
+        if (draw < 0.05) {
+            throw InputError("scene", "key", "value", "rule broken");
+        }
+        if (draw < 0.1) {
+            record.status = RunStatus::unstable;
+            record.message = "blew up";
+        } else if (draw < 0.15) {
+            record.series[100].force = std::nan("");
+        } else if (draw < 0.2) {
+            record.series.clear();
+        }
+        return record;
+    };
+    const Fit fit = fit_study(study, options);
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    EXPECT_NEAR(fit.parameters[0].value / true_earlywood, 1, 0.03);
+    EXPECT_NEAR(fit.parameters[1].value / true_latewood, 1, 0.03);
+    int failed = 0;
+    for (const FitRun& run : fit.runs) {
+        EXPECT_EQ(std::isinf(run.misfit), run.status != "finished") << run.status;
+        failed += std::isinf(run.misfit) ? 1 : 0;
+    }
+    EXPECT_GT(failed, 2);
+}
+
+TEST(SystemFit, SaysSoWhenNoRunEndsWell) {
+    const FakeWedge wedge;
+    const Study study = wedge_study(wedge);
+    FitOptions options = with(wedge);
+    options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::runtime_error("no luck"); };
+    const Fit fit = fit_study(study, options);
+    EXPECT_EQ(fit.status, FitStatus::failed);
+    EXPECT_NE(fit.message.find("no luck"), std::string::npos);
+    EXPECT_GT(fit.runs.size(), 0u);
+    EXPECT_TRUE(std::isinf(fit.misfit));
+    EXPECT_EQ(fit.parameters[0].lower_95, 20);
+    EXPECT_EQ(fit.parameters[0].upper_95, 400);
+}
+
+TEST(SystemFit, KeepsToTheRunLimit) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    for (const int limit : {1, 2, 5, 9, 13}) {
+        study.optimizer.max_runs = limit;
+        const Fit fit = fit_study(study, with(wedge, 3));
+        EXPECT_EQ(fit.status, FitStatus::run_limit);
+        EXPECT_LE(fit.runs.size(), static_cast<std::size_t>(limit));
+        EXPECT_TRUE(std::isfinite(fit.misfit));
+        EXPECT_TRUE(fit.covariance.allFinite());
+    }
+}
+
+TEST(SystemFit, AnInterruptEndsItWithWhatItHas) {
+    const FakeWedge wedge;
+    for (const char* method : {"auto", "ceres", "bobyqa", "crs2"}) {
+        Study study = wedge_study(wedge, 0.02, 1e-4);
+        study.optimizer.method = method;
+        std::atomic<bool> stop{false};
+        std::atomic<int> runs{0};
+        FitOptions options = with(wedge, 2);
+        options.stop_requested = &stop;
+        options.forward = [&](const Scene& scene, const std::atomic<bool>* flag) {
+            EXPECT_EQ(flag, &stop);
+            Record record = wedge(scene);
+            if (++runs >= 8) {
+                stop = true;
+                record.status = RunStatus::interrupted;
+            }
+            return record;
+        };
+        const Fit fit = fit_study(study, options);
+        EXPECT_EQ(fit.status, FitStatus::interrupted) << method;
+        EXPECT_LE(runs, 9) << method;  // one more may have been under way on the other thread
+        EXPECT_TRUE(std::isfinite(fit.misfit)) << method;
+    }
+}
+
+TEST(SystemFit, PriorsPullAsTheirWidthSays) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    const Fit free = fit_study(study, with(wedge));
+    study.parameters[1].prior = Prior{160, 0.05};
+    const Fit bound = fit_study(study, with(wedge));
+    EXPECT_NEAR(free.parameters[1].value, true_latewood, 3);
+    EXPECT_NEAR(bound.parameters[1].value, 160, 1);
+    study.parameters[1].prior = Prior{160, 1e6};
+    const Fit loose = fit_study(study, with(wedge));
+    EXPECT_NEAR(loose.parameters[1].value, free.parameters[1].value, 0.5 * free.parameters[1].standard_error);
+}
+
+TEST(SystemFit, FlagsAParameterAtItsBound) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.parameters[1].upper = 150;
+    study.parameters[1].initial = 100;
+    for (const char* method : {"auto", "ceres"}) {
+        study.optimizer.method = method;
+        const Fit fit = fit_study(study, with(wedge));
+        EXPECT_TRUE(fit.parameters[1].at_bound) << method;
+        EXPECT_FALSE(fit.parameters[0].at_bound) << method;
+        EXPECT_NEAR(fit.parameters[1].value, 150, 0.1) << method;
+        EXPECT_LE(fit.parameters[1].upper_95, 150) << method;
+        EXPECT_NE(fit.message.find("'LW toughness' stands at its upper bound"), std::string::npos) << fit.message;
+    }
+}
+
+TEST(SystemFit, WeightsAndSeveralExperimentsAddUp) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4, 5);
+    const Fit once = fit_study(study, with(wedge));
+    study.experiments.push_back(study.experiments[0]);
+    const Fit twice = fit_study(study, with(wedge));
+    study.experiments.pop_back();
+    study.experiments[0].weight = 2;
+    const Fit heavy = fit_study(study, with(wedge));
+    EXPECT_EQ(twice.residuals.size(), 2 * once.residuals.size());
+    EXPECT_NEAR(heavy.misfit / twice.misfit, 1, 1e-3);
+    EXPECT_NEAR(heavy.misfit / once.misfit, 2, 1e-2);
+    EXPECT_NEAR(heavy.parameters[0].value, twice.parameters[0].value, 1e-3 * heavy.parameters[0].value);
+}
+
+void expect_refused(const std::function<void(Study&)>& spoil, const std::string& key) {
+    Study study = wedge_study(FakeWedge{});
+    study.file = "study.toml";
+    spoil(study);
+    bool ran = false;
+    FitOptions options;
+    options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
+        ran = true;
+        return FakeWedge{}(scene);
+    };
+    try {
+        fit_study(study, options);
+        FAIL() << key << " accepted";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.key, key);
+        EXPECT_EQ(error.file, "study.toml");
+    }
+    EXPECT_FALSE(ran);
+}
+
+TEST(UnitFit, RefusesStudiesThatCannotBeFitted) {
+    expect_refused([](Study& s) { s.experiments.clear(); }, "experiments");
+    expect_refused([](Study& s) { s.parameters.clear(); }, "parameters");
+    expect_refused([](Study& s) { s.parameters[1].keys.clear(); }, "parameters.1.key");
+    expect_refused([](Study& s) { s.parameters[1].upper = s.parameters[1].lower; }, "parameters.1.upper");
+    expect_refused([](Study& s) { s.parameters[0].initial = 500; }, "parameters.0.initial");
+    expect_refused([](Study& s) { s.parameters[0].lower = 0; }, "parameters.0.lower");
+    expect_refused([](Study& s) { s.parameters[0].prior = Prior{100, 0}; }, "parameters.0.prior.sd");
+    expect_refused([](Study& s) { s.experiments[0].weight = 0; }, "experiments.0.weight");
+    expect_refused([](Study& s) { s.experiments[0].noise.force = 0.0; }, "experiments.0.noise.force");
+    expect_refused([](Study& s) { s.optimizer.method = "newuoa"; }, "optimizer.method");
+    expect_refused([](Study& s) { s.optimizer.starts = 0; }, "optimizer.starts");
+    expect_refused([](Study& s) { s.optimizer.max_runs = 0; }, "optimizer.max_runs");
+    expect_refused([](Study& s) { s.uncertainty.profile = true; }, "uncertainty.profile");
+    expect_refused([](Study& s) { s.uncertainty.posterior = 100; }, "uncertainty.posterior");
+    expect_refused(
+        [](Study& s) {
+            s.experiments[0].data.crack_length.clear();
+            for (std::size_t i = 1; i + 1 < s.experiments[0].data.force.size(); ++i) {
+                s.experiments[0].data.force[i] = std::nan("");
+            }
+            s.parameters.push_back(s.parameters[0]);
+        },
+        "parameters");
+}
+
+TEST(UnitFit, RefusesAKeyThatNoSceneHas) {
+    Study study = wedge_study(FakeWedge{});
+    study.parameters[0].keys = {"materials.bark.toughness"};
+    EXPECT_THROW(fit_study(study, with(FakeWedge{})), InputError);
+}
+
+TEST(UnitFit, RefusesOptionsOutOfRange) {
+    FitOptions options = with(FakeWedge{});
+    options.threads = -1;
+    try {
+        fit_study(wedge_study(FakeWedge{}), options);
+        FAIL() << "accepted";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.key, "threads");
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::testing

@@ -1,0 +1,289 @@
+#include "inverse/minimize.hpp"
+#include "inverse/differences.hpp"
+#include "inverse/local_model.hpp"
+#include "inverse/pool.hpp"
+#include "inverse/search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <set>
+
+namespace crampfit {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::VectorXd;
+
+// Mildly curved residuals with their zero at (0.6, 0.3).
+Evaluation curved(const VectorXd& x, int = 1) {
+    Evaluation evaluation;
+    evaluation.status = "finished";
+    evaluation.residuals.resize(3);
+    evaluation.residuals << std::exp(x[0]) - std::exp(0.6), std::sin(x[0] + 2 * x[1]) - std::sin(1.2),
+        x[1] * x[1] - 0.09 + x[0] - 0.6;
+    evaluation.residuals *= 10;
+    evaluation.misfit = evaluation.residuals.squaredNorm();
+    return evaluation;
+}
+
+Eigen::MatrixXd curved_jacobian(const VectorXd& x) {
+    Eigen::MatrixXd jacobian(3, 2);
+    jacobian << std::exp(x[0]), 0, std::cos(x[0] + 2 * x[1]), 2 * std::cos(x[0] + 2 * x[1]), 1, 2 * x[1];
+    return 10 * jacobian;
+}
+
+// One in five points fails, always the same ones.
+Evaluation often_failing(const VectorXd& x, int) {
+    const auto bits = static_cast<std::uint64_t>(std::abs(x.sum()) * 1e12);
+    if (bits % 5 == 0) {
+        Evaluation failed;
+        failed.status = "unstable";
+        return failed;
+    }
+    return curved(x);
+}
+
+TEST(UnitPool, RunsEachJobOnceAndThrowsTheFirstException) {
+    std::vector<int> calls(100, 0);
+    parallel_for(100, 4, [&](int i) { ++calls[static_cast<std::size_t>(i)]; });
+    EXPECT_EQ(calls, std::vector<int>(100, 1));
+    try {
+        parallel_for(10, 3, [](int i) {
+            if (i % 4 == 3) {
+                throw std::runtime_error(std::to_string(i));
+            }
+        });
+        FAIL() << "nothing thrown";
+    } catch (const std::runtime_error& error) {
+        EXPECT_STREQ(error.what(), "3");
+    }
+    EXPECT_EQ(thread_count(3), 3);
+    EXPECT_GE(thread_count(0), 1);
+}
+
+TEST(UnitObjective, RunsAPointOnceAndNoMoreThanTheBudget) {
+    std::atomic<int> runs{0};
+    Objective objective(
+        2,
+        [&](const VectorXd& x, int) {
+            ++runs;
+            return curved(x);
+        },
+        3, 2);
+    const std::vector<VectorXd> points{Vector2d(0, 0), Vector2d(1, 0), Vector2d(0, 0)};
+    const auto first = objective.at(points);
+    EXPECT_EQ(runs, 2);
+    EXPECT_EQ(first[0], first[2]);
+    const std::vector<VectorXd> more{Vector2d(1, 0), Vector2d(0.5, 0), Vector2d(0.25, 0)};
+    const auto second = objective.at(more);
+    EXPECT_EQ(runs, 3);
+    EXPECT_EQ(second[0], first[1]);
+    EXPECT_TRUE(second[1]);
+    EXPECT_FALSE(second[2]);
+    EXPECT_TRUE(objective.exhausted());
+    ASSERT_EQ(objective.runs().size(), 3u);
+    EXPECT_EQ(objective.runs()[2].x, more[1]);
+    EXPECT_EQ(objective.best()->x, more[1]);
+}
+
+TEST(UnitObjective, BranchesShareRunsAndJoinInOrder) {
+    std::atomic<int> runs{0};
+    Objective objective(
+        2,
+        [&](const VectorXd& x, int) {
+            ++runs;
+            return curved(x);
+        },
+        10, 1);
+    objective.at(Vector2d(0.5, 0.5));
+    Objective a = objective.branch(2, 1), b = objective.branch(2, 1);
+    b.at(Vector2d(0.1, 0.1));
+    b.at(Vector2d(0.2, 0.2));
+    EXPECT_FALSE(b.at(Vector2d(0.3, 0.3)));
+    a.at(Vector2d(0.5, 0.5));
+    a.at(Vector2d(0.1, 0.1));
+    EXPECT_EQ(runs, 3);
+    objective.join(a);
+    objective.join(b);
+    ASSERT_EQ(objective.runs().size(), 3u);
+    EXPECT_EQ(objective.runs()[1].x, Vector2d(0.1, 0.1));
+    EXPECT_EQ(objective.budget_left(), 7);
+}
+
+TEST(GradientDifferences, JacobianMatchesTheAnalyticOne) {
+    Objective objective(2, curved, 100, 2);
+    const Vector2d x(0.55, 0.4);
+    // Central differences err by h^2 / 6 times the third derivative, here 8 * 10 at most: 0.012.
+    EXPECT_LT((*jacobian(objective, x) - curved_jacobian(x)).cwiseAbs().maxCoeff(), 0.0125);
+    EXPECT_EQ(objective.runs().size(), 5u);
+}
+
+TEST(GradientDifferences, OneSidedAtABoundAndBesideAFailedRun) {
+    const Vector2d corner(1, 0);
+    Objective at_corner(2, curved, 100, 1);
+    const auto derivative = jacobian(at_corner, corner);
+    // One-sided ones err by h / 2 times the second derivative, here 4 * 10 at most: 0.6.
+    EXPECT_LT((*derivative - curved_jacobian(corner)).cwiseAbs().maxCoeff(), 0.61);
+    for (const auto& run : at_corner.runs()) {
+        EXPECT_TRUE((run.x.array() >= 0).all() && (run.x.array() <= 1).all());
+    }
+    const Vector2d x(0.5, 0.5);
+    Objective one_side(
+        2, [&](const VectorXd& p, int) { return p[0] > 0.51 ? Evaluation{} : curved(p); }, 100, 1);
+    EXPECT_LT((*jacobian(one_side, x) - curved_jacobian(x)).cwiseAbs().maxCoeff(), 0.61);
+    Objective near_only(
+        2, [&](const VectorXd& p, int) { return (p - x).norm() > 0.02 ? Evaluation{} : curved(p); }, 100, 1);
+    EXPECT_LT((*jacobian(near_only, x) - curved_jacobian(x)).cwiseAbs().maxCoeff(), 0.0125);  // with half the step
+    Objective nowhere(
+        2, [&](const VectorXd& p, int) { return p != x ? Evaluation{} : curved(p); }, 100, 1);
+    EXPECT_FALSE(jacobian(nowhere, x));
+}
+
+TEST(GradientLocalModel, IsExactForQuadraticsAndMeasuresScatter) {
+    const Vector2d centre(0.5, 0.5);
+    const auto quadratic = [](const VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.residuals = Vector2d(1 + 2 * x[0] - 3 * x[1] + 4 * x[0] * x[1] + x[0] * x[0], x[1] * x[1] - x[0]);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(2, quadratic, 100, 1);
+    for (double dx : {-0.03, 0.0, 0.03}) {
+        for (double dy : {-0.03, 0.0, 0.03}) {
+            objective.at(centre + Vector2d(dx, dy));
+        }
+    }
+    objective.at(Vector2d(0.9, 0.9));  // too far to have a say
+    const auto model = LocalModel::fit(objective.runs(), centre, difference_reach);
+    ASSERT_TRUE(model);
+    Eigen::Matrix2d expected;
+    expected << 2 + 4 * 0.5 + 2 * 0.5, -3 + 4 * 0.5, -1, 2 * 0.5;
+    EXPECT_LT((model->jacobian() - expected).norm(), 1e-10);
+    EXPECT_LT(model->scatter().norm(), 1e-12);
+    EXPECT_EQ(model->freedom(), 3);
+    const Vector2d x(0.52, 0.47);
+    EXPECT_LT((model->residuals(x) - quadratic(x, 1).residuals).norm(), 1e-12);
+}
+
+TEST(UnitLocalModel, IsAbsentWhereRunsDoNotSpanAllDirections) {
+    Objective objective(2, curved, 100, 1);
+    for (int i = 0; i < 10; ++i) {
+        objective.at(Vector2d(0.5 + 0.004 * i, 0.5));
+    }
+    EXPECT_FALSE(LocalModel::fit(objective.runs(), Vector2d(0.5, 0.5), difference_reach));
+}
+
+TEST(UnitMinimize, CeresFindsAZeroToAMillionth) {
+    Objective objective(2, curved, 200, 2);
+    EXPECT_TRUE(minimize(objective, Vector2d(0.1, 0.9), {"ceres"}).converged);
+    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(UnitMinimize, CeresStopsAtABound) {
+    const auto beyond = [](const VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.residuals = Vector2d(x[0] - 1.5, x[1] - 0.25);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(2, beyond, 200, 1);
+    EXPECT_TRUE(minimize(objective, Vector2d(0.2, 0.9), {"ceres"}).converged);
+    EXPECT_EQ(objective.best()->x[0], 1);
+    EXPECT_NEAR(objective.best()->x[1], 0.25,
+                2e-3);  // at the tolerance of 1e-4 of the misfit, which the bound keeps at 0.25
+}
+
+class Methods : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Methods, FindsTheMinimumWithinTheBox) {
+    Objective objective(2, curved, 1500, 1);
+    minimize(objective, Vector2d(0.1, 0.9), {GetParam(), 3});
+    // Evolution (isres) comes no closer with so many runs, the others by far.
+    const double tolerance = GetParam() == "isres" ? 0.03 : 0.002;
+    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), tolerance)
+        << objective.best()->x.transpose();
+    for (const auto& run : objective.runs()) {
+        EXPECT_TRUE((run.x.array() >= 0).all() && (run.x.array() <= 1).all());
+    }
+}
+
+TEST_P(Methods, GoesOnWhenOneRunInFiveFails) {
+    Objective objective(2, often_failing, 1500, 1);
+    OptimizerChoice choice;
+    choice.method = GetParam();
+    choice.starts = 2;
+    search(objective, choice, Vector2d(0.12, 0.88), 5, [](const std::string&) {});
+    int failed = 0;
+    for (const auto& run : objective.runs()) {
+        failed += run.evaluation->usable() ? 0 : 1;
+    }
+    EXPECT_GT(failed, 0);
+    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), 0.03)
+        << objective.best()->x.transpose();
+}
+
+TEST_P(Methods, KeepsToTheBudgetAndSaysSo) {
+    Objective objective(2, curved, 7, 1);
+    EXPECT_FALSE(minimize(objective, Vector2d(0.1, 0.9), {GetParam()}).converged);
+    EXPECT_EQ(objective.runs().size(), 7u);
+    double least = INFINITY;
+    for (const auto& run : objective.runs()) {
+        least = std::min(least, run.evaluation->misfit);
+    }
+    EXPECT_EQ(objective.best()->evaluation->misfit, least);
+}
+
+TEST_P(Methods, WorksInOneDimension) {
+    const auto line = [](const VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.residuals = Vector2d(std::exp(x[0]) - std::exp(0.3), x[0] - 0.3);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(1, line, 300, 1);
+    minimize(objective, VectorXd::Constant(1, 0.9), {GetParam(), 2});
+    EXPECT_NEAR(objective.best()->x[0], 0.3, 0.01);
+}
+
+TEST_P(Methods, PassesOnOurOwnExceptions) {
+    Objective objective(
+        2, [](const VectorXd&, int) -> Evaluation { throw std::logic_error("ours"); }, 50, 1);
+    EXPECT_THROW(minimize(objective, Vector2d(0.1, 0.9), {GetParam()}), std::logic_error);
+}
+
+INSTANTIATE_TEST_SUITE_P(UnitMinimize, Methods, ::testing::ValuesIn(method_names()),
+                         [](const auto& test) { return test.param; });
+
+// Two hollows: one at 0.2 where the search begins, with a misfit of some 36, and the true one at 0.8.
+TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {
+    const auto two_hollows = [](const VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.residuals = 10 * Eigen::Vector3d(8 * (x[0] - 0.2) * (x[0] - 0.8), x[0] - 0.8, x[1] - 0.5);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    for (const int starts : {1, 4}) {
+        Objective objective(2, two_hollows, 500, 1);
+        OptimizerChoice choice;
+        choice.starts = starts;
+        search(objective, choice, Vector2d(0.2, 0.5), 1, [](const std::string&) {});
+        EXPECT_NEAR(objective.best()->x[0], starts == 1 ? 0.2 : 0.8, 0.06);
+    }
+}
+
+TEST(UnitSearch, StartsFillTheBoxEvenly) {
+    for (const unsigned seed : {1u, 2u}) {
+        std::set<int> cells;
+        for (int i = 1; i <= 36; ++i) {
+            const VectorXd x = halton(i, 2, seed);
+            cells.insert(static_cast<int>(x[0] * 4) + 4 * static_cast<int>(x[1] * 3));
+        }
+        EXPECT_EQ(cells.size(), 12u);  // of 4 x 3 cells, none is left empty
+    }
+    EXPECT_NE(halton(1, 2, 1u), halton(1, 2, 2u));
+}
+
+}  // namespace
+}  // namespace crampfit

@@ -1,0 +1,230 @@
+#include "inverse/residuals.hpp"
+#include "datasets/error.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace crampfit::testing {
+namespace {
+
+// A record whose force and crack length are straight in the displacement.
+Record straight(double force_slope, double crack_speed, double last, int rows = 400) {
+    Record record;
+    for (int i = 0; i < rows; ++i) {
+        Instant instant;
+        instant.displacement = last * i / (rows - 1);
+        instant.time = 2 * instant.displacement;
+        instant.force = force_slope * instant.displacement;
+        instant.crack_length = 2e-3 + crack_speed * instant.displacement;
+        record.series.push_back(instant);
+    }
+    return record;
+}
+
+Experiment straight_experiment() {
+    Experiment experiment;
+    experiment.name = "test";
+    experiment.data = measure(straight(1e5, 8, 1e-3), 0, 0, 1);
+    experiment.noise = {.force = 2.0, .crack_length = 0.2e-3, .displacement = {}, .time = {}};
+    return experiment;
+}
+
+std::vector<FitResidual> of_kind(const Comparison& comparison, const std::string& kind) {
+    std::vector<FitResidual> result;
+    for (const FitResidual& station : comparison.stations()) {
+        if (station.kind == kind) {
+            result.push_back(station);
+        }
+    }
+    return result;
+}
+
+TEST(UnitResiduals, VanishWhereModelAndDataAreTheSameCurve) {
+    const FakeWedge wedge;
+    const Study study = wedge_study(wedge);
+    const Comparison comparison(study.experiments[0]);
+    ASSERT_GT(comparison.stations().size(), 60u);
+    const Eigen::VectorXd modelled = comparison.modelled(wedge(true_earlywood, true_latewood));
+    for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+        const FitResidual& station = comparison.stations()[i];
+        EXPECT_NEAR(modelled[static_cast<Eigen::Index>(i)], station.measured, 1e-12 * std::abs(station.measured));
+    }
+}
+
+TEST(UnitResiduals, ForceStationsTileTheRangeAndAverageTheirRows) {
+    const Comparison comparison(straight_experiment());
+    const auto force = of_kind(comparison, "force");
+    ASSERT_EQ(force.size(), 50u);
+    for (const FitResidual& station : force) {
+        EXPECT_NEAR(station.measured, 1e5 * station.at, 1e-9);
+        EXPECT_NEAR(station.sigma, 2.0 / std::sqrt(8.0), 0.05);  // 400 rows in 50 windows; a window may have one more
+    }
+}
+
+TEST(UnitResiduals, ArrivalSigmaIsTheNoiseOverTheSlope) {
+    const Comparison comparison(straight_experiment());
+    const auto arrivals = of_kind(comparison, "arrival");
+    ASSERT_GE(arrivals.size(), 16u);  // 8 mm of growth, a station at least every 0.5 mm
+    ASSERT_LE(arrivals.size(), 32u);  // and at most every 0.25 mm
+    for (const FitResidual& station : arrivals) {
+        EXPECT_NEAR(station.measured, (station.at - 2e-3) / 8, 1e-9);
+        EXPECT_NEAR(station.sigma, 0.2e-3 / std::sqrt(8.0) / 8, 0.07 * station.sigma);
+    }
+}
+
+TEST(UnitResiduals, ArrivalSigmaNeverFallsBelowTheSamplingInterval) {
+    Experiment experiment = straight_experiment();
+    experiment.noise.crack_length = 1e-9;
+    for (const FitResidual& station : of_kind(Comparison(experiment), "arrival")) {
+        EXPECT_NEAR(station.sigma, 1e-3 / 399, 1e-12);
+    }
+}
+
+TEST(UnitResiduals, StationsInOneJumpCountTogetherAsOne) {
+    Experiment experiment = straight_experiment();
+    for (std::size_t i = 0; i < experiment.data.crack_length.size(); ++i) {
+        experiment.data.crack_length[i] = i < 200 ? 2e-3 : 6e-3;
+    }
+    const auto arrivals = of_kind(Comparison(experiment), "arrival");
+    ASSERT_GT(arrivals.size(), 8u);
+    double weight = 0;
+    for (const FitResidual& station : arrivals) {
+        weight += 1 / (station.sigma * station.sigma);
+    }
+    EXPECT_LE(1 / std::sqrt(weight), 2 * 1e-3 / 399);
+    // One event, timed to about the sampling interval; smoothing puts the jump's ends a window apart, out of each
+    // other's reach.
+    EXPECT_GE(1 / std::sqrt(weight), 0.8 * 1e-3 / 399);
+}
+
+TEST(UnitResiduals, DisplacementNoiseEntersByTheSlope) {
+    Experiment experiment = straight_experiment();
+    experiment.noise.displacement = 3e-5;
+    const Comparison comparison(experiment);
+    for (const FitResidual& station : of_kind(comparison, "force")) {
+        EXPECT_NEAR(station.sigma, std::hypot(2.0, 1e5 * 3e-5) / std::sqrt(8.0), 0.09);
+    }
+    for (const FitResidual& station : of_kind(comparison, "arrival")) {
+        EXPECT_NEAR(station.sigma, std::hypot(0.2e-3 / 8, 3e-5) / std::sqrt(8.0), 0.07 * station.sigma);
+    }
+}
+
+TEST(UnitResiduals, FewRowsAreStationsThemselves) {
+    Experiment experiment = straight_experiment();
+    experiment.data = measure(straight(1e5, 8, 1e-3, 9), 0, 0, 1);
+    const auto force = of_kind(Comparison(experiment), "force");
+    ASSERT_EQ(force.size(), 9u);
+    EXPECT_DOUBLE_EQ(force[3].at, experiment.data.displacement[3]);
+    EXPECT_DOUBLE_EQ(force[3].sigma, 2.0);
+}
+
+TEST(UnitResiduals, GapsAreSkipped) {
+    Experiment experiment = straight_experiment();
+    for (std::size_t i = 100; i < 200; ++i) {
+        experiment.data.force[i] = std::nan("");
+    }
+    for (const FitResidual& station : of_kind(Comparison(experiment), "force")) {
+        EXPECT_NEAR(station.measured, 1e5 * station.at, 1e-9);
+        EXPECT_FALSE(station.at > 0.262e-3 && station.at < 0.488e-3) << station.at;
+    }
+}
+
+TEST(UnitResiduals, WithoutDisplacementTimeIsUsed) {
+    Experiment experiment = straight_experiment();
+    experiment.data.displacement.clear();
+    const Comparison comparison(experiment);
+    for (const FitResidual& station : of_kind(comparison, "force")) {
+        EXPECT_NEAR(station.measured, 0.5e5 * station.at, 1e-9);
+    }
+    const Eigen::VectorXd modelled = comparison.modelled(straight(1e5, 8, 1e-3));
+    EXPECT_NEAR(modelled[10], comparison.stations()[10].measured, 1e-9);
+}
+
+TEST(UnitResiduals, AVibrationIsAveragedInModelAndDataAlike) {
+    const Experiment experiment = straight_experiment();
+    const Comparison comparison(experiment);
+    Record vibrating = straight(1e5, 8, 1e-3, 4000);
+    for (Instant& instant : vibrating.series) {
+        instant.force += 10 * std::sin(2 * M_PI * instant.displacement / 0.01e-3);  // two periods in a window
+    }
+    const Eigen::VectorXd modelled = comparison.modelled(vibrating);
+    for (Eigen::Index i = 0; i < 50; ++i) {
+        EXPECT_NEAR(modelled[i], comparison.stations()[static_cast<std::size_t>(i)].measured, 0.2);
+    }
+}
+
+TEST(UnitResiduals, ModelForceAfterASplitIsZeroAndElseTheLast) {
+    const Comparison comparison(straight_experiment());
+    Record record = straight(1e5, 8, 0.5e-3);
+    EXPECT_NEAR(comparison.modelled(record)[49], 50, 1e-9);
+    record.status = RunStatus::split;
+    EXPECT_NEAR(comparison.modelled(record)[49], 0, 1e-12);
+    EXPECT_NEAR(comparison.modelled(record)[10], comparison.stations()[10].measured, 1e-9);
+}
+
+// The modelled arrival must go on smoothly when a record ends just before a station instead of just behind it.
+TEST(UnitResiduals, AStationThatIsNeverReachedIsFiniteAndContinuous) {
+    const Comparison comparison(straight_experiment());
+    const auto last = static_cast<Eigen::Index>(comparison.stations().size()) - 1;
+    const double needed = comparison.stations().back().measured;
+    double before = 1e9;
+    for (double end = 0.3e-3; end < 1e-3; end += 0.01e-3) {
+        const double arrival = comparison.modelled(straight(1e5, 8, end))[last];
+        EXPECT_NEAR(arrival, needed, 1e-6);  // the test's own pace continues a model of the same pace
+        EXPECT_LE(arrival, before + 1e-6);
+        before = arrival;
+    }
+    Record stuck = straight(1e5, 0, 1e-3);
+    EXPECT_GT(comparison.modelled(stuck)[last], 1.5e-3);  // more than the last displacement
+    EXPECT_TRUE(comparison.modelled(stuck).allFinite());
+}
+
+TEST(UnitResiduals, NoiseThatIsNotGivenIsEstimatedAndSaidSo) {
+    Experiment experiment = straight_experiment();
+    experiment.noise = {};
+    experiment.data = measure(straight(1e5, 8, 1e-3), 3.0, 0.1e-3, 7);
+    const Comparison comparison(experiment);
+    const auto force = of_kind(comparison, "force");
+    EXPECT_NEAR(force[20].sigma * std::sqrt(8.0), 3.0, 0.75);  // 400 rows: the median is good to some 8 %, three sigma
+    ASSERT_EQ(comparison.remarks().size(), 2u);
+    EXPECT_NE(comparison.remarks()[0].find("noise of force"), std::string::npos);
+    EXPECT_NE(comparison.remarks()[1].find("noise of crack_length"), std::string::npos);
+}
+
+void expect_refused(const Experiment& experiment, const std::string& key) {
+    try {
+        const Comparison comparison(experiment);
+        FAIL() << "accepted";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.key, key);
+        EXPECT_EQ(error.file, "bad.csv");
+    }
+}
+
+TEST(UnitResiduals, RefusesDataThatCannotBeCompared) {
+    Experiment experiment = straight_experiment();
+    experiment.data_file = "bad.csv";
+    Experiment bad = experiment;
+    bad.data.displacement.clear();
+    bad.data.time.clear();
+    expect_refused(bad, "displacement");
+    bad = experiment;
+    bad.data.force.clear();
+    bad.data.crack_length.clear();
+    expect_refused(bad, "force");
+    bad = experiment;
+    bad.data.displacement.assign(400, 1e-3);
+    expect_refused(bad, "displacement");
+    bad = experiment;
+    std::reverse(bad.data.displacement.begin() + 200, bad.data.displacement.end());
+    expect_refused(bad, "displacement");
+    bad = experiment;
+    bad.data.force.clear();
+    bad.data.crack_length.assign(400, 2e-3);
+    expect_refused(bad, "crack_length");
+}
+
+}  // namespace
+}  // namespace crampfit::testing

@@ -1,0 +1,119 @@
+#include "inverse/uncertainty.hpp"
+#include "inverse/fit.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit::testing {
+namespace {
+
+// Force rises with the product of two parameters, and nothing else depends on them.
+TEST(SystemUncertainty, NamesParametersThatCannotBeToldApart) {
+    const auto product = [](const Scene& scene, const std::atomic<bool>*) {
+        Record record;
+        for (int i = 0; i <= 100; ++i) {
+            Instant instant;
+            instant.displacement = 1e-5 * i;
+            instant.force = 1e-3 * scene.materials.at("EW").toughness * scene.materials.at("LW").toughness *
+                            instant.displacement / 1e-3;
+            record.series.push_back(instant);
+        }
+        return record;
+    };
+    for (const Scale scale : {Scale::linear, Scale::logarithmic}) {
+        Study study = wedge_study(FakeWedge{});
+        study.parameters[0].scale = study.parameters[1].scale = scale;
+        study.experiments[0].scene.materials["EW"].toughness = 100;
+        study.experiments[0].scene.materials["LW"].toughness = 200;
+        study.experiments[0].data = measure(product(study.experiments[0].scene, nullptr), 0.05, 0, 2);
+        study.experiments[0].data.crack_length.clear();
+        study.experiments[0].noise.force = 0.05;
+        FitOptions options;
+        options.forward = product;
+        const Fit fit = fit_study(study, options);
+        EXPECT_NEAR(fit.parameters[0].value * fit.parameters[1].value, 20000, 100);
+        EXPECT_NE(fit.message.find("'EW toughness' and 'LW toughness' cannot be told apart"), std::string::npos)
+            << fit.message;
+        for (const FittedParameter& parameter : fit.parameters) {
+            EXPECT_NEAR(parameter.lower_95, 20, 1e-9);
+            EXPECT_NEAR(parameter.upper_95, 400, 1e-9);
+            EXPECT_TRUE(std::isfinite(parameter.standard_error));
+        }
+        EXPECT_LT(fit.correlation(0, 1), -0.99);
+    }
+}
+
+TEST(SystemUncertainty, NamesAParameterWithoutEffect) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.parameters[1].keys = {"materials.LW.E"};
+    study.parameters[1].name = "LW modulus";
+    study.experiments[0].scene.materials["LW"].toughness = true_latewood;
+    const Fit fit = fit_study(study, with(wedge));
+    EXPECT_NE(fit.message.find("'LW modulus' cannot be told from this data"), std::string::npos) << fit.message;
+    EXPECT_NEAR(fit.parameters[0].value, true_earlywood, 3);
+    EXPECT_LT(fit.parameters[0].upper_95, 120);
+    EXPECT_NEAR(fit.parameters[1].upper_95, 400, 1e-9);
+}
+
+// 100 tests of the same wood, each with its own noise. For intervals that cover 95 % of the time, fewer than 88 or more
+// than 100 happen once in a thousand such hundreds (binomial).
+TEST(VerificationUncertainty, IntervalsCoverTheTruthAsOftenAsTheySay) {
+    FakeWedge wedge;
+    wedge.sharpness = 1;
+    int covered[2] = {0, 0};
+    std::vector<double> errors[2];
+    for (unsigned seed = 0; seed < 100; ++seed) {
+        const Study study = wedge_study(wedge, 0.02, 1e-4, 500 + seed);
+        const Fit fit = fit_study(study, with(wedge, 2));
+        ASSERT_EQ(fit.status, FitStatus::converged);
+        for (std::size_t j = 0; j < 2; ++j) {
+            const double truth = j == 0 ? true_earlywood : true_latewood;
+            const FittedParameter& parameter = fit.parameters[j];
+            covered[j] += parameter.lower_95 <= truth && truth <= parameter.upper_95 ? 1 : 0;
+            errors[j].push_back(std::abs(parameter.value - truth) / parameter.standard_error);
+        }
+    }
+    for (std::size_t j = 0; j < 2; ++j) {
+        EXPECT_GE(covered[j], 88);
+        std::nth_element(errors[j].begin(), errors[j].begin() + 50, errors[j].end());
+        // Half of all normal errors are below 0.67 standard errors; the median of 100 is good to 0.08, here three times
+        // that.
+        EXPECT_GT(errors[j][50], 0.43);
+        EXPECT_LT(errors[j][50], 0.91);
+    }
+}
+
+TEST(VerificationUncertainty, IntervalsWidenWithTheNoiseOfTheModel) {
+    const FakeWedge wedge;
+    const Study study = wedge_study(wedge, 0.02, 1e-4, 3);
+    FitOptions options = with(wedge, 2);
+    const Fit calm = fit_study(study, options);
+    int covered = 0;
+    double error = 0;
+    for (unsigned seed = 1; seed <= 30; ++seed) {
+        options.forward = noisy(wedge, 0.15);
+        options.seed = seed;  // other starts, other runs, other noise
+        const Fit fit = fit_study(study, options);
+        covered += fit.parameters[0].lower_95 <= true_earlywood && true_earlywood <= fit.parameters[0].upper_95 ? 1 : 0;
+        error += fit.parameters[0].standard_error / 30;
+    }
+    EXPECT_GT(error, 2 * calm.parameters[0].standard_error);
+    EXPECT_GE(covered, 24);  // of 30 at 95 %, fewer happen once in a thousand times (binomial)
+}
+
+TEST(VerificationUncertainty, StudentQuantilesMatchTheTable) {
+    // Abramowitz and Stegun (1964), table 26.10.
+    EXPECT_NEAR(student_975(1), 12.706, 5e-4);
+    EXPECT_NEAR(student_975(2), 4.303, 5e-4);
+    EXPECT_NEAR(student_975(3), 3.182, 5e-4);
+    EXPECT_NEAR(student_975(10), 2.228, 5e-4);
+    EXPECT_NEAR(student_975(25), 2.060, 5e-4);
+    EXPECT_NEAR(student_975(120), 1.980, 5e-4);
+}
+
+}  // namespace
+}  // namespace crampfit::testing
