@@ -18,11 +18,12 @@ namespace {
 
 constexpr int most_threads = 4096;  // more is a slip of the finger
 
-} // namespace
+}  // namespace
 
 void add_common_options(CLI::App& command, CommonOptions& common) {
     common.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, most_threads);
-    command.add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
+    command
+        .add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
     command.add_option("--threads", common.threads, "Cores to use; all of them unless told")
@@ -52,9 +53,7 @@ void check_output(const std::filesystem::path& output, const std::filesystem::pa
     require_writable(output);
 }
 
-void complain(const std::string& line) {
-    std::fputs(("crampfit: " + line + '\n').c_str(), stderr);
-}
+void complain(const std::string& line) { std::fputs(("crampfit: " + line + '\n').c_str(), stderr); }
 
 void print(const std::string& text) {
     const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
@@ -68,4 +67,4 @@ void report(const CommonOptions& common, const std::string& line) {
         complain(line);
 }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

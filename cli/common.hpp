@@ -44,4 +44,4 @@ void print(const std::string& text);
 /// A line on standard error, unless --quiet, and in the log.
 void report(const CommonOptions& common, const std::string& line);
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -8,7 +8,8 @@ namespace crampfit::cli {
 
 Verb explain_verb(CLI::App& command, const CommonOptions& common) {
     auto file = std::make_shared<std::filesystem::path>();
-    CLI::App* verb = command.add_subcommand("explain", "What will be modelled, by which solver, why, and what it will cost");
+    CLI::App* verb =
+        command.add_subcommand("explain", "What will be modelled, by which solver, why, and what it will cost");
     verb->add_option("scene", *file, "The scene")->type_name("SCENE.toml")->required();
     return {verb, [file, &common] {
                 Scene scene = read_scene(*file, overrides_of(common));
@@ -18,4 +19,4 @@ Verb explain_verb(CLI::App& command, const CommonOptions& common) {
             }};
 }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -22,10 +22,13 @@ struct Arguments {
 
 ExitStatus exit_status(FitStatus status) {
     switch (status) {
-    case FitStatus::converged: return ExitStatus::done;
-    case FitStatus::interrupted: return ExitStatus::interrupted;
+    case FitStatus::converged:
+        return ExitStatus::done;
+    case FitStatus::interrupted:
+        return ExitStatus::interrupted;
     case FitStatus::run_limit:
-    case FitStatus::failed: return ExitStatus::incomplete;
+    case FitStatus::failed:
+        return ExitStatus::incomplete;
     }
     throw std::logic_error("a fit status without an exit status");
 }
@@ -49,8 +52,8 @@ std::string table_text(const Fit& fit) {
     std::size_t width = std::string("parameter").size();
     for (const FittedParameter& parameter : fit.parameters)
         width = std::max(width, parameter.name.size());
-    std::string text =
-        fmt::format("{:<{}}  {:>11}  {:>14}  {:>23}  unit\n", "parameter", width, "value", "standard error", "95 % interval");
+    std::string text = fmt::format("{:<{}}  {:>11}  {:>14}  {:>23}  unit\n", "parameter", width, "value",
+                                   "standard error", "95 % interval");
     for (const FittedParameter& parameter : fit.parameters)
         text += fmt::format("{:<{}}  {:>11.4g}  {:>14.3g}  {:>23}  {}{}\n", parameter.name, width, parameter.value,
                             parameter.standard_error,
@@ -74,7 +77,7 @@ ExitStatus fit_and_save(const Arguments& arguments, const CommonOptions& common)
     return exit_status(fit.status);
 }
 
-} // namespace
+}  // namespace
 
 Verb fit_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
@@ -84,4 +87,4 @@ Verb fit_verb(CLI::App& command, const CommonOptions& common) {
     return {verb, [arguments, &common] { return fit_and_save(*arguments, common); }};
 }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

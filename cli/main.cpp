@@ -30,8 +30,8 @@ void start_log(const CommonOptions& common, const std::vector<std::string>& word
     spdlog::info("crampfit {}: {}", CRAMPFIT_VERSION, fmt::join(words, " "));
 }
 
-/// Stands in for closed standard streams, so that no file of ours gets their numbers. Printing to a closed standard output
-/// stays an error.
+/// Stands in for closed standard streams, so that no file of ours gets their numbers. Printing to a closed standard
+/// output stays an error.
 void fill_closed_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (::fcntl(stream, F_GETFD) < 0)
@@ -64,13 +64,15 @@ ExitStatus run_command(int argc, const char* const* argv) {
     command.set_version_flag("--version", "crampfit " CRAMPFIT_VERSION);
     command.require_subcommand(1);
     command.fallthrough();  // common options may stand after the verb
-    command.footer("Exit status: 0 done; 1 the run or fit did not reach its end; 2 bad input or usage; 130 interrupted.");
+    command.footer(
+        "Exit status: 0 done; 1 the run or fit did not reach its end; 2 bad input or usage; 130 interrupted.");
     CommonOptions common;
     add_common_options(command, common);
-    const std::vector<Verb> verbs{simulate_verb(command, common), explain_verb(command, common), fit_verb(command, common),
-                                  csv_verb(command, common)};
+    const std::vector<Verb> verbs{simulate_verb(command, common), explain_verb(command, common),
+                                  fit_verb(command, common), csv_verb(command, common)};
     for (const Verb& verb : verbs)
-        verb.arguments->footer("Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
+        verb.arguments->footer(
+            "Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
     try {
         command.parse(argc, argv);
     } catch (const CLI::ParseError& end) {
@@ -80,9 +82,9 @@ ExitStatus run_command(int argc, const char* const* argv) {
     return run_verb(verbs);
 }
 
-} // namespace
+}  // namespace
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli
 
 int main(int argc, char** argv) {
     using crampfit::cli::ExitStatus, crampfit::cli::fail;

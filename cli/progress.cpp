@@ -34,7 +34,7 @@ std::string rate_text(double rate) {
     return fmt::format("{:.3g}", rate);
 }
 
-} // namespace
+}  // namespace
 
 std::string duration_text(double seconds) {
     if (seconds < 9.5)
@@ -101,4 +101,4 @@ void ProgressLine::draw_bar(double fraction, const std::string& text) {
     bar_is_drawn_ = true;
 }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -7,8 +7,8 @@
 
 namespace crampfit::cli {
 
-/// Shows how far the work is on standard error: a bar with rate and time left on a terminal, plain lines elsewhere, nothing
-/// with --quiet. The plain lines go to the log as well.
+/// Shows how far the work is on standard error: a bar with rate and time left on a terminal, plain lines elsewhere,
+/// nothing with --quiet. The plain lines go to the log as well.
 class ProgressLine {
   public:
     /// `counted` names what is done many times, such as "steps".
@@ -39,4 +39,4 @@ class ProgressLine {
 /// A duration for a person: "0.25 s", "12 s", "3:05 min", "2:10 h".
 std::string duration_text(double seconds);
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

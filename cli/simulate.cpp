@@ -1,7 +1,7 @@
+#include "forward/simulate.hpp"
 #include "cli/progress.hpp"
 #include "cli/stop.hpp"
 #include "cli/verbs.hpp"
-#include "forward/simulate.hpp"
 #include "imaging/picture.hpp"
 
 #include <fmt/format.h>
@@ -21,9 +21,12 @@ struct Arguments {
 ExitStatus exit_status(RunStatus status) {
     switch (status) {
     case RunStatus::finished:
-    case RunStatus::split: return ExitStatus::done;
-    case RunStatus::interrupted: return ExitStatus::interrupted;
-    case RunStatus::unstable: return ExitStatus::incomplete;
+    case RunStatus::split:
+        return ExitStatus::done;
+    case RunStatus::interrupted:
+        return ExitStatus::interrupted;
+    case RunStatus::unstable:
+        return ExitStatus::incomplete;
     }
     throw std::logic_error("a run status without an exit status");
 }
@@ -53,7 +56,7 @@ ExitStatus simulate_and_save(const Arguments& arguments, const CommonOptions& co
     return exit_status(record.status);
 }
 
-} // namespace
+}  // namespace
 
 Verb simulate_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
@@ -63,4 +66,4 @@ Verb simulate_verb(CLI::App& command, const CommonOptions& common) {
     return {verb, [arguments, &common] { return simulate_and_save(*arguments, common); }};
 }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -21,7 +21,7 @@ extern "C" void on_signal(int) {
     [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, answer.data(), answer.size());
 }
 
-} // namespace
+}  // namespace
 
 void stop_on_signals() {
     struct sigaction action {};
@@ -33,4 +33,4 @@ void stop_on_signals() {
 
 const std::atomic<bool>& stop_requested() { return requested; }
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -19,4 +19,4 @@ Verb explain_verb(CLI::App& command, const CommonOptions& common);
 Verb fit_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
 
-} // namespace crampfit::cli
+}  // namespace crampfit::cli

@@ -102,7 +102,8 @@ void write_runs(Group& root, const std::vector<FitRun>& runs, std::size_t parame
     std::vector<double> values;
     for (const FitRun& run : runs)
         values.insert(values.end(), run.parameters.begin(), run.parameters.end());
-    group.write("parameters", values, {runs.size(), parameters}, {parameter_units, "a row a run, a column a parameter"});
+    group.write("parameters", values, {runs.size(), parameters},
+                {parameter_units, "a row a run, a column a parameter"});
     group.write("misfit", column_of(runs, &FitRun::misfit),
                 {"1", "sum of squared weighted residuals; infinite when the run failed"});
     group.write_texts("status", column_of(runs, &FitRun::status), "how the run ended");
@@ -156,7 +157,8 @@ std::vector<FitResidual> read_residuals(const Group& group) {
 
 FitStatus read_status(const Group& root) {
     const std::string text = root.read_text("status");
-    for (const FitStatus status : {FitStatus::converged, FitStatus::run_limit, FitStatus::interrupted, FitStatus::failed})
+    for (const FitStatus status :
+         {FitStatus::converged, FitStatus::run_limit, FitStatus::interrupted, FitStatus::failed})
         if (text == name(status))
             return status;
     root.refuse("status", text, "must be converged, run limit, interrupted or failed");
@@ -169,7 +171,7 @@ unsigned read_seed(const Group& root) {
     return static_cast<unsigned>(seed);
 }
 
-} // namespace
+}  // namespace
 
 void write(const Fit& fit, const std::filesystem::path& file) {
     hdf5::save(file, "fit", [&](Group& root) {
@@ -209,4 +211,4 @@ Fit read_fit(const std::filesystem::path& file) {
     return fit;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -20,9 +20,9 @@ namespace {
 
 static_assert(std::is_same_v<hid_t, std::int64_t>);
 
-constexpr std::size_t compress_from = 4096;     // [bytes]; below, a chunk's index costs more than compression saves
-constexpr std::size_t chunk_bytes = 1u << 20;   // what HDF5's own chunk cache holds
-constexpr unsigned compression_level = 4;       // higher ones cost time and save next to nothing on noisy floats
+constexpr std::size_t compress_from = 4096;    // [bytes]; below, a chunk's index costs more than compression saves
+constexpr std::size_t chunk_bytes = 1u << 20;  // what HDF5's own chunk cache holds
+constexpr unsigned compression_level = 4;      // higher ones cost time and save next to nothing on noisy floats
 
 /// Errors come back as exceptions of ours; HDF5 would print its own account as well.
 void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
@@ -36,10 +36,14 @@ struct Types {
 
 Types types_of(Element element) {
     switch (element) {
-    case Element::byte: return {H5T_NATIVE_UINT8, H5T_STD_U8LE, H5T_INTEGER, 1};
-    case Element::integer: return {H5T_NATIVE_INT64, H5T_STD_I64LE, H5T_INTEGER, 8};
-    case Element::single_precision: return {H5T_NATIVE_FLOAT, H5T_IEEE_F32LE, H5T_FLOAT, 4};
-    case Element::double_precision: return {H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE, H5T_FLOAT, 8};
+    case Element::byte:
+        return {H5T_NATIVE_UINT8, H5T_STD_U8LE, H5T_INTEGER, 1};
+    case Element::integer:
+        return {H5T_NATIVE_INT64, H5T_STD_I64LE, H5T_INTEGER, 8};
+    case Element::single_precision:
+        return {H5T_NATIVE_FLOAT, H5T_IEEE_F32LE, H5T_FLOAT, 4};
+    case Element::double_precision:
+        return {H5T_NATIVE_DOUBLE, H5T_IEEE_F64LE, H5T_FLOAT, 8};
     }
     throw std::logic_error("an element type without an HDF5 type");
 }
@@ -87,11 +91,11 @@ bool put_attribute(hid_t object, const std::string& name, const std::string& tex
 }
 
 std::string now_utc() {
-    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(
-                                                     std::chrono::system_clock::now())));
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}",
+                       fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
 }
 
-} // namespace
+}  // namespace
 
 void Group::refuse(const std::string& name, const std::string& found, const std::string& rule) const {
     throw InputError(file_, path_ + name, found, rule);
@@ -147,7 +151,8 @@ std::string Group::attribute_of(const std::string& dataset, const std::string& n
     return text;
 }
 
-Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape& shape, std::size_t bytes_per_value) const {
+Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape& shape,
+                         std::size_t bytes_per_value) const {
     const Id space = space_of(shape);
     const Id properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     if (!shape.empty() && product(shape) * bytes_per_value >= compress_from) {
@@ -157,9 +162,9 @@ Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape
         H5Pset_chunk(properties.get(), static_cast<int>(chunk.size()), chunk.data());
         H5Pset_shuffle(properties.get());
         H5Pset_deflate(properties.get(), compression_level);
-        H5Pset_fletcher32(properties.get());
     }
-    Id dataset(H5Dcreate2(id_.get(), name.c_str(), type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose);
+    Id dataset(H5Dcreate2(id_.get(), name.c_str(), type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
+               H5Dclose);
     check(dataset.valid(), name, "create");
     return dataset;
 }
@@ -170,7 +175,8 @@ void Group::write_numbers(const std::string& name, Element element, const void* 
         throw std::logic_error(fmt::format("{}{}: {} values do not fill {}", path_, name, count, in_words(shape)));
     const Types types = types_of(element);
     const Id dataset = create_dataset(name, types.file, shape, types.bytes);
-    check(count == 0 || H5Dwrite(dataset.get(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name, "write");
+    check(count == 0 || H5Dwrite(dataset.get(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name,
+          "write");
     check(put_attribute(dataset.get(), "units", meaning.units), name, "write");
     check(put_attribute(dataset.get(), "description", meaning.description), name, "write");
 }
@@ -182,8 +188,8 @@ void Group::write_strings(const std::string& name, const std::vector<std::string
     std::vector<const char*> characters;
     for (const std::string& text : texts)
         characters.push_back(text.c_str());
-    check(texts.empty() || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, characters.data()) >= 0, name,
-          "write");
+    check(texts.empty() || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, characters.data()) >= 0,
+          name, "write");
     check(put_attribute(dataset.get(), "description", description), name, "write");
 }
 
@@ -191,7 +197,8 @@ void Group::write_text(const std::string& name, const std::string& text, const s
     write_strings(name, {text}, {}, description);
 }
 
-void Group::write_texts(const std::string& name, const std::vector<std::string>& texts, const std::string& description) {
+void Group::write_texts(const std::string& name, const std::vector<std::string>& texts,
+                        const std::string& description) {
     write_strings(name, texts, {texts.size()}, description);
 }
 
@@ -221,8 +228,9 @@ void Group::read_numbers(const std::string& name, Element element, const Expecte
     const Id stored(H5Dget_type(dataset.get()), H5Tclose);
     const Types types = types_of(element);
     if (H5Tget_class(stored.get()) != types.kind || H5Tget_size(stored.get()) > types.bytes)
-        refuse(name, "another type", fmt::format("must hold {} of at most {} bytes",
-                                                 types.kind == H5T_FLOAT ? "floating-point numbers" : "integers", types.bytes));
+        refuse(name, "another type",
+               fmt::format("must hold {} of at most {} bytes",
+                           types.kind == H5T_FLOAT ? "floating-point numbers" : "integers", types.bytes));
     shape = checked_shape(name, dataset, expected);
     const std::size_t count = product(shape);
     void* values = make_room(count);
@@ -290,9 +298,6 @@ void save(const std::filesystem::path& file, const std::string& kind, const std:
     // could not flush.
     const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_fapl_core(access.get(), chunk_bytes, false);
-    // The oldest format whose headers carry checksums, so that what was damaged on its way is refused; in newer ones
-    // HDF5 1.10 gives images that it does not open.
-    H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
     const Id id(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose);
     if (!id.valid())
         throw InputError(name, "", "", "HDF5 could not make the file in memory");
@@ -314,4 +319,4 @@ void save(const std::filesystem::path& file, const std::string& kind, const std:
     write_whole_file(file, image);
 }
 
-} // namespace crampfit::hdf5
+}  // namespace crampfit::hdf5

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-/// The one layer over the HDF5 C interface: identifiers that close themselves, whole arrays in and out, every failure an
-/// InputError that names file, dataset and rule. HDF5 as it is packaged serves one thread at a time; so does this.
+/// The one layer over the HDF5 C interface: identifiers that close themselves, whole arrays in and out, every failure
+/// an InputError that names file, dataset and rule. HDF5 as it is packaged serves one thread at a time; so does this.
 namespace crampfit::hdf5 {
 
 /// Owns an identifier of any kind.
@@ -56,7 +56,7 @@ template <> inline constexpr Element element_of<float> = Element::single_precisi
 
 template <class T>
 concept Number = std::is_same_v<T, std::uint8_t> || std::is_same_v<T, std::int64_t> || std::is_same_v<T, float> ||
-                 std::is_same_v<T, double>;
+    std::is_same_v<T, double>;
 
 template <Number T> struct Array {
     Shape shape;
@@ -66,7 +66,8 @@ template <Number T> struct Array {
 /// A group of a file, or the file's root.
 class Group {
   public:
-    Group(Id id, std::string file, std::string path) : id_(std::move(id)), file_(std::move(file)), path_(std::move(path)) {}
+    Group(Id id, std::string file, std::string path)
+        : id_(std::move(id)), file_(std::move(file)), path_(std::move(path)) {}
 
     Group make_group(const std::string& name, const std::string& description);
     Group group(const std::string& name) const;
@@ -127,14 +128,15 @@ class Group {
     [[noreturn]] void refuse(const std::string& name, const std::string& found, const std::string& rule) const;
 
   private:
-    void write_numbers(const std::string& name, Element element, const void* values, std::size_t count, const Shape& shape,
-                       const Meaning& meaning);
+    void write_numbers(const std::string& name, Element element, const void* values, std::size_t count,
+                       const Shape& shape, const Meaning& meaning);
     void read_numbers(const std::string& name, Element element, const ExpectedShape& expected, Shape& shape,
                       const std::function<void*(std::size_t)>& make_room) const;
     void write_strings(const std::string& name, const std::vector<std::string>& texts, const Shape& shape,
                        const std::string& description);
     std::vector<std::string> read_strings(const std::string& name, const ExpectedShape& expected) const;
-    Id create_dataset(const std::string& name, std::int64_t type, const Shape& shape, std::size_t bytes_per_value) const;
+    Id create_dataset(const std::string& name, std::int64_t type, const Shape& shape,
+                      std::size_t bytes_per_value) const;
     Id open_dataset(const std::string& name) const;
     Shape checked_shape(const std::string& name, const Id& dataset, const ExpectedShape& expected) const;
     void check(bool succeeded, const std::string& name, const char* action) const;
@@ -153,4 +155,4 @@ Group open(const std::filesystem::path& file, const std::string& kind);
 /// Makes a file of this kind: `fill` gets the root. The file appears under its name when it is whole, or not at all.
 void save(const std::filesystem::path& file, const std::string& kind, const std::function<void(Group&)>& fill);
 
-} // namespace crampfit::hdf5
+}  // namespace crampfit::hdf5

@@ -15,7 +15,8 @@ const std::array<SeriesColumn, 13> series_columns{{
      [](Instant& i) -> double& { return i.displacement; }},
     {"force", "N", "force_N", "reaction at the load cell, for the given thickness",
      [](Instant& i) -> double& { return i.force; }},
-    {"crack_length", "m", "crack_length_m", "length of the tracked crack", [](Instant& i) -> double& { return i.crack_length; }},
+    {"crack_length", "m", "crack_length_m", "length of the tracked crack",
+     [](Instant& i) -> double& { return i.crack_length; }},
     {"tip_x", "m", "tip_x_m", "tip of the tracked crack in the undeformed specimen",
      [](Instant& i) -> double& { return i.tip.x(); }},
     {"tip_y", "m", "tip_y_m", "tip of the tracked crack in the undeformed specimen",
@@ -118,12 +119,15 @@ void read_cracks(const Group& root, Record& record) {
 }
 
 void write_reactions(Group& root, const std::vector<ReactionHistory>& reactions) {
-    Group all = root.make_group("reactions", "total force of each edge and body on the specimen, row by row with the series");
+    Group all =
+        root.make_group("reactions", "total force of each edge and body on the specimen, row by row with the series");
     for (std::size_t i = 0; i < reactions.size(); ++i) {
         Group group = all.make_group(numbered(i), "one edge or body");
         group.write_text("name", reactions[i].name, "name of the edge or body in the scene");
-        write_component(group, "force_x", reactions[i].force, 0, {"N", "force on the specimen, for the given thickness"});
-        write_component(group, "force_y", reactions[i].force, 1, {"N", "force on the specimen, for the given thickness"});
+        write_component(group, "force_x", reactions[i].force, 0,
+                        {"N", "force on the specimen, for the given thickness"});
+        write_component(group, "force_y", reactions[i].force, 1,
+                        {"N", "force on the specimen, for the given thickness"});
     }
 }
 
@@ -203,7 +207,7 @@ Record read_all_but_frames(const Group& root) {
     return record;
 }
 
-} // namespace
+}  // namespace
 
 void write(const Record& record, const std::filesystem::path& file) {
     hdf5::save(file, "record", [&](Group& root) {
@@ -236,4 +240,4 @@ Record read_record(const std::filesystem::path& file) {
     return record;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

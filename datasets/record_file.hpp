@@ -9,9 +9,9 @@ namespace crampfit {
 
 /// A column of the series, in a file and in a table.
 struct SeriesColumn {
-    const char* name;         // of the dataset
+    const char* name;  // of the dataset
     const char* units;
-    const char* header;       // of the table's column
+    const char* header;  // of the table's column
     const char* description;
     double& (*value)(Instant&);
 };
@@ -25,4 +25,4 @@ std::size_t crack_number(const Record& record, std::size_t further);
 /// What `read_record` gives, without the frames, which are most of a file.
 Record read_record_without_frames(const std::filesystem::path& file);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -41,7 +41,7 @@ void check_labels(const Group& root, const Specimen& specimen) {
     }
 }
 
-} // namespace
+}  // namespace
 
 void write(const Specimen& specimen, const std::filesystem::path& file) {
     const hdf5::Shape shape{static_cast<std::size_t>(specimen.rows), static_cast<std::size_t>(specimen.columns)};
@@ -75,4 +75,4 @@ Specimen read_specimen(const std::filesystem::path& file) {
     return specimen;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

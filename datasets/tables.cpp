@@ -75,8 +75,8 @@ Table crack_table(const Record& record, const CrackHistory& crack) {
     for (std::size_t i = 0; i < record.series.size(); ++i) {
         const Instant& instant = record.series[i];
         Row& row = table.emplace_back();
-        for (const double value : {instant.time, instant.displacement, crack.length[i], crack.tip[i].x(), crack.tip[i].y(),
-                                   crack.G[i], crack.K_I[i], crack.K_II[i]})
+        for (const double value : {instant.time, instant.displacement, crack.length[i], crack.tip[i].x(),
+                                   crack.tip[i].y(), crack.G[i], crack.K_I[i], crack.K_II[i]})
             row.push_back(text_of(value));
     }
     return table;
@@ -104,7 +104,8 @@ std::vector<Offer> offers(const Record& record) {
     if (const auto tracked = static_cast<std::size_t>(record.tracked_crack); tracked < record.paths.size())
         offers.push_back({"path", [&record, tracked] { return path_table(record.paths[tracked]); }});
     for (std::size_t i = 0; i < record.cracks.size(); ++i) {
-        offers.push_back({fmt::format("crack{}", i + 1), [&record, i] { return crack_table(record, record.cracks[i]); }});
+        offers.push_back(
+            {fmt::format("crack{}", i + 1), [&record, i] { return crack_table(record, record.cracks[i]); }});
         offers.push_back({fmt::format("path{}", i + 1),
                           [&record, i] { return path_table(record.paths.at(crack_number(record, i))); }});
     }
@@ -115,8 +116,7 @@ std::vector<Offer> offers(const Record& record) {
 // ---- tables of a fit
 
 Table parameters_table(const Fit& fit) {
-    Table table{
-        {"name", "key", "value", "unit", "standard_error", "lower_95", "upper_95", "initial", "at_bound"}};
+    Table table{{"name", "key", "value", "unit", "standard_error", "lower_95", "upper_95", "initial", "at_bound"}};
     for (const FittedParameter& parameter : fit.parameters)
         table.push_back({parameter.name, parameter.key, text_of(parameter.value), parameter.unit,
                          text_of(parameter.standard_error), text_of(parameter.lower_95), text_of(parameter.upper_95),
@@ -174,10 +174,11 @@ void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path&
         names.push_back(offer.name);
     }
     throw InputError(file.string(), "table", wanted,
-                     names.empty() ? "this file has no tables" : fmt::format("must be one of: {}", fmt::join(names, ", ")));
+                     names.empty() ? "this file has no tables"
+                                   : fmt::format("must be one of: {}", fmt::join(names, ", ")));
 }
 
-} // namespace
+}  // namespace
 
 void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out) {
     const std::string kind = hdf5::open(file).attribute("kind");
@@ -192,4 +193,4 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     }
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -77,7 +77,8 @@ class TemporaryFile {
     bool renamed_ = false;
 };
 
-/// Brings the new name itself to the disk. The content is safe already, so a file system that cannot do this is no error.
+/// Brings the new name itself to the disk. The content is safe already, so a file system that cannot do this is no
+/// error.
 void sync_folder(const fs::path& folder) {
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0)
@@ -86,7 +87,7 @@ void sync_folder(const fs::path& folder) {
     ::close(descriptor);
 }
 
-} // namespace
+}  // namespace
 
 void require_writable(const fs::path& file) {
     std::error_code error;
@@ -112,4 +113,4 @@ void write_whole_file(const fs::path& file, std::string_view bytes) {
     sync_folder(folder_of(target));
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -29,26 +29,26 @@ bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out) {
 
 } // namespace
 
-SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double most_frequency_squared)
+SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, const std::vector<double>& mass,
+                         double most_frequency_squared)
     : shape_(shape), body_(body) {
     const Points& points = body.points;
-    std::vector<double> node_mass(body.layout.nodes(), 0.0);
-    for (int p = 0; p < points.count(); ++p)
-        for (int k = 0; k < 4; ++k) node_mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
-    std::vector<double> node_stiffness(body.layout.nodes(), 0.0);
+    std::vector<double> added(mass.size(), 0.0);
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets) {
         stiffness_.push_back(points.stiffest(f.point) / h * f.length * body.layout.thickness);
-        for (int k = 0; k < 4; ++k) node_stiffness[points.node[f.point][k]] += stiffness_.back() * f.weight[k];
+        for (int k = 0; k < 4; ++k) added[points.node[f.point][k]] += stiffness_.back() * f.weight[k];
     }
     // A facet on a node with hardly any mass must not shorten the time step.
     for (std::size_t i = 0; i < stiffness_.size(); ++i) {
         const Facet& f = body.facets[i];
+        double least = 1.0;
         for (int k = 0; k < 4; ++k) {
             const int n = points.node[f.point][k];
-            if (f.weight[k] > 0.0 && node_stiffness[n] > most_frequency_squared * node_mass[n])
-                stiffness_[i] = std::min(stiffness_[i], stiffness_[i] * most_frequency_squared * node_mass[n] / node_stiffness[n]);
+            if (f.weight[k] == 0.0 || added[n] <= most_frequency_squared * mass[n]) continue;
+            least = std::min(least, most_frequency_squared * mass[n] / added[n]);
         }
+        stiffness_[i] *= least;
     }
 }
 

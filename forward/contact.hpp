@@ -11,7 +11,8 @@ namespace crampfit {
 /// the depth is what one more cell would give way. It never pulls.
 class SlidingBody {
   public:
-    SlidingBody(const Shape& shape, const Discretisation& body, double most_frequency_squared);
+    /// `mass` of the fields [kg]; the springs add at most `most_frequency_squared` to the highest squared frequency [1/s^2].
+    SlidingBody(const Shape& shape, const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared);
 
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].
     Vec2 push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);

@@ -73,8 +73,7 @@ Solution minimize_with_ceres(Objective& objective, const Eigen::VectorXd& start)
     NoiseFloor noise_floor;
     ceres::Solver::Options options;
     options.callbacks.push_back(&noise_floor);
-    options.initial_trust_region_radius =
-        10;  // a start may be far off, where a whole Gauss-Newton step would overshoot
+    options.initial_trust_region_radius = 10;  // from afar, a whole Gauss-Newton step would overshoot
     options.linear_solver_type = ceres::DENSE_QR;
     options.line_search_interpolation_type = ceres::QUADRATIC;  // needs no Jacobian at trial points
     options.max_num_iterations = 1000;                          // the budget of runs is what ends a long descent

@@ -93,6 +93,9 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
         const Solution solution = descend(branch, *start, {"auto", seed});
         objective.join(branch);
+        if (!branch.best()) {
+            break;  // stopped before its first run
+        }
         seen.push_back(*start);
         seen.push_back(branch.best()->x);
         if (i == 0 || objective.best()->evaluation->misfit < least) {

@@ -33,7 +33,8 @@ class Command {
         for (const std::string& argument : arguments)
             words.push_back(const_cast<char*>(argument.c_str()));
         words.push_back(nullptr);
-        if (!std::freopen((folder / "out.txt").c_str(), "w", stdout) || !std::freopen((folder / "error.txt").c_str(), "w", stderr))
+        if (!std::freopen((folder / "out.txt").c_str(), "w", stdout) ||
+            !std::freopen((folder / "error.txt").c_str(), "w", stderr))
             ::_exit(126);
         ::execv(COMMAND, words.data());
         ::_exit(127);

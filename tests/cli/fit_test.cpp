@@ -49,7 +49,7 @@ void make_data(Command& command) {
     write_curves(curves, command.path("pull.csv"));
 }
 
-} // namespace
+}  // namespace
 
 TEST(SystemCommand, FitFindsWhatMadeTheData) {
     Command command;

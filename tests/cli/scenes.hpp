@@ -52,7 +52,9 @@ displacement = "0.1 mm"
 /// The same, pulled so slowly and so long that it would run for hours.
 inline const std::string endless_scene = [] {
     std::string scene = small_scene;
-    const auto replace = [&](const std::string& from, const std::string& to) { scene.replace(scene.find(from), from.size(), to); };
+    const auto replace = [&](const std::string& from, const std::string& to) {
+        scene.replace(scene.find(from), from.size(), to);
+    };
     replace("\"5 m/s\"", "\"1 um/s\"");
     replace("displacement = \"0.1 mm\"", "time = \"1000 s\"");
     return scene;

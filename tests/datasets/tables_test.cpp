@@ -59,7 +59,7 @@ Fit small_fit() {
     return fit;
 }
 
-} // namespace
+}  // namespace
 
 // INTERFACE.md, "Scene": the header to the letter. The numbers: the shortest text that reads back as the same bits.
 TEST(UnitTables, Series) {

@@ -260,7 +260,7 @@ INSTANTIATE_TEST_SUITE_P(UnitMinimize, Methods, ::testing::ValuesIn(method_names
 TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {
     const auto two_hollows = [](const VectorXd& x, int) {
         Evaluation evaluation;
-        evaluation.residuals = 10 * Eigen::Vector3d(8 * (x[0] - 0.2) * (x[0] - 0.8), x[0] - 0.8, x[1] - 0.5);
+        evaluation.residuals = 10 * Eigen::Vector3d(60 * (x[0] - 0.2) * (x[0] - 0.8), x[0] - 0.8, x[1] - 0.5);
         evaluation.misfit = evaluation.residuals.squaredNorm();
         return evaluation;
     };

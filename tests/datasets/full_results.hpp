@@ -1,0 +1,120 @@
+#pragma once
+
+#include "datasets/fit.hpp"
+#include "datasets/record.hpp"
+#include "datasets/record_file.hpp"
+#include "datasets/specimen.hpp"
+
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace crampfit {
+
+inline constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double infinite = std::numeric_limits<double>::infinity();
+
+/// Numbers that are easily spoilt: signed zero, the smallest and largest, infinities, not a number, and ones with all
+/// digits.
+inline std::vector<double> awkward_numbers() {
+    return {0.0,
+            -0.0,
+            1.0 / 3.0,
+            std::numeric_limits<double>::denorm_min(),
+            std::numeric_limits<double>::max(),
+            -infinite,
+            infinite,
+            not_a_number,
+            0.1};
+}
+
+inline std::vector<Vec2> some_points(std::size_t count) {
+    std::mt19937_64 random(count);
+    std::normal_distribution<double> normal;
+    std::vector<Vec2> points(count);
+    for (Vec2& point : points)
+        point = {normal(random), normal(random)};
+    return points;
+}
+
+/// Two cracks, of which the second one is tracked, two reactions with names that no HDF5 path could hold, two frames.
+inline Record full_record() {
+    Record record;
+    record.status = RunStatus::split;
+    record.message = "the crack left the specimen";
+    record.tracked_crack = 1;
+    record.paths = {some_points(2), some_points(17)};
+    CrackHistory crack;
+    for (const double number : awkward_numbers()) {
+        Instant instant;
+        for (const SeriesColumn& column : series_columns)
+            column.value(instant) = number;
+        instant.time = 1e-6 * static_cast<double>(record.series.size());
+        record.series.push_back(instant);
+        crack.length.push_back(number);
+        crack.tip.push_back({number, -number});
+        crack.G.push_back(number);
+        crack.K_I.push_back(number);
+        crack.K_II.push_back(number);
+    }
+    record.cracks = {crack};
+    record.reactions = {{"left/right wheel", some_points(record.series.size())}, {"Auflager ä", crack.tip}};
+    record.point_position = some_points(5000);
+    record.point_latewood.assign(5000, 0.25f);
+    for (int i = 0; i < 2; ++i) {
+        Frame frame{.time = 0.1 * i, .displacement = not_a_number, .moved = {}, .stress = {}, .crack = some_points(3)};
+        for (const Vec2& point : record.point_position) {
+            frame.moved.push_back(point.cast<float>() * static_cast<float>(i));
+            frame.stress.push_back(
+                {static_cast<float>(point.x()), std::numeric_limits<float>::infinity(), -0.0f, 1e-40f});
+        }
+        record.frames.push_back(frame);
+    }
+    record.scene_text = "title = \"TR+ über μm 年輪\"\n[model]\n";
+    record.explanation = "explicit dynamics";
+    record.steps = 123456789012;
+    record.points = 5000;
+    record.seconds = 1.5;
+    record.worst_energy_imbalance = not_a_number;
+    return record;
+}
+
+inline Fit full_fit() {
+    Fit fit;
+    fit.status = FitStatus::run_limit;
+    fit.message = "max_runs was used up";
+    fit.method = "ceres: few parameters";
+    fit.parameters = {{"EW, toughness", "materials.EW.toughness materials.ray.toughness", 103.25, "J/m^2", 1.0 / 3.0,
+                       -infinite, infinite, 80.0, false},
+                      {"LW \"hard\"", "materials.LW.toughness", not_a_number, "", 0.0, -0.0, 5e-324, 1.0, true}};
+    fit.covariance = Eigen::MatrixXd{{1.0, 0.1}, {0.3, infinite}};
+    fit.correlation = Eigen::MatrixXd{{1.0, -0.5}, {-0.25, 1.0}};
+    fit.misfit = 12.75;
+    fit.reduced_chi_square = 0.9;
+    fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5},
+                     {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
+    fit.runs = {{{80.0, 120.0}, infinite, "unstable", 0.5}, {{103.25, not_a_number}, 12.75, "finished", 0.625}};
+    fit.seconds = 3.25;
+    fit.seed = 4000000000u;
+    fit.study_text = "title = 'ü'";
+    return fit;
+}
+
+inline Specimen full_specimen() {
+    Specimen specimen;
+    specimen.columns = 7;
+    specimen.rows = 3;
+    specimen.pixel = 25e-6;
+    specimen.classes = {"EW", "Spätholz"};
+    specimen.label.assign(21, 0);
+    specimen.label[4] = 1;
+    specimen.label[20] = Specimen::void_label;
+    specimen.grade.assign(21, 0.0f);
+    specimen.grade[1] = 1.0f / 3.0f;
+    specimen.density.assign(21, 312.5f);
+    specimen.density[3] = std::numeric_limits<float>::quiet_NaN();
+    specimen.source = "block.png";
+    return specimen;
+}
+
+}  // namespace crampfit
