@@ -53,7 +53,7 @@ void ExplicitSolver::surface_forces() {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
         reaction_[driver] = sliding_[i].push(moved(driver), displacement_, force_);
-        books_.work += plan_.time_step * reaction_[driver].dot(velocity_of(driver, time_));
+        books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver));
     }
 }
 
@@ -115,9 +115,10 @@ void ExplicitSolver::prescribe_velocities() {
     const double dt = plan_.time_step;
     for (const Held& held : held_) {
         double& v = velocity_[held.field][held.axis];
-        const double wanted = velocity_of(held.driver, time_ + 0.5 * dt)[held.axis];
+        const double wanted = mean_velocity_of(held.driver)[held.axis];
+        const double before = v - dt * acceleration_[held.field][held.axis];
         const double force = mass_[held.field] * (wanted - v) / dt;
-        books_.work += force * dt * wanted;
+        books_.work += force * dt * 0.5 * (before + wanted);
         reaction_[held.driver][held.axis] += force;
         acceleration_[held.field][held.axis] += (wanted - v) / dt;
         v = wanted;

@@ -64,7 +64,8 @@ class ExplicitSolver {
     void place_bodies();
     void weigh_nodes();
     void adopt(const std::vector<CrackFields::NewField>& fields);
-    Vec2 velocity_of(int driver, double time) const;
+    Vec2 velocity_of(int driver) const;
+    Vec2 mean_velocity_of(int driver) const;
     double travel_time(int driver) const;
 
     void surface_forces();

@@ -84,7 +84,7 @@ void ExplicitSolver::hold_nodes() {
         for (std::size_t i = 0; i < on_nodes; ++i)
             if (held_[i].field == cracks_.node_of_field[f]) held_.push_back({f, held_[i].axis, held_[i].driver});
     for (const Held& h : held_) {
-        velocity_[h.field][h.axis] = velocity_of(h.driver, 0.0)[h.axis];
+        velocity_[h.field][h.axis] = velocity_of(h.driver)[h.axis];
         books_.work += 0.5 * mass_[h.field] * velocity_[h.field][h.axis] * velocity_[h.field][h.axis];
     }
 }
@@ -127,12 +127,16 @@ double ExplicitSolver::travel_time(int driver) const {
     return until.value_or(std::numeric_limits<double>::infinity());
 }
 
-Vec2 ExplicitSolver::velocity_of(int driver, double time) const {
-    if (time >= travel_time(driver)) return Vec2::Zero();
+Vec2 ExplicitSolver::velocity_of(int driver) const {
     const int edges = static_cast<int>(scene_.edges.size());
     if (driver >= edges) return scene_.bodies[driver - edges].velocity;
     const Edge& edge = scene_.edges[driver];
     return {edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)};
+}
+
+// Over the step that begins now: in the step in which it stops a driver goes just as far as it should.
+Vec2 ExplicitSolver::mean_velocity_of(int driver) const {
+    return velocity_of(driver) * std::clamp((travel_time(driver) - time_) / plan_.time_step, 0.0, 1.0);
 }
 
 Vec2 ExplicitSolver::moved(int driver) const {
@@ -148,7 +152,7 @@ Vec2 ExplicitSolver::moved(int driver) const {
         }
         return sum / length;
     }
-    return velocity_of(driver, 0.0) * std::min(time_, travel_time(driver));
+    return velocity_of(driver) * std::min(time_, travel_time(driver));
 }
 
 void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {

@@ -129,8 +129,9 @@ void Recorder::save_row() {
     row.fracture_energy = books.fracture;
     row.external_work = books.work;
     const double kept = books.strain + books.kinetic + books.contact + books.fracture + books.damped;
-    const double largest = std::max({std::abs(books.work), kept, 1e-300});
-    if (steps_ > 0) record_.worst_energy_imbalance = std::max(record_.worst_energy_imbalance, std::abs(books.work - kept) / largest);
+    largest_energy_ = std::max({largest_energy_, std::abs(books.work), kept});
+    largest_imbalance_ = std::max(largest_imbalance_, std::abs(books.work - kept));
+    if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;
     record_.series.push_back(row);
     if (!evenly_ && static_cast<int>(record_.series.size()) > 2 * scene_.output.samples) thin_out();
 }

@@ -57,6 +57,8 @@ class Recorder {
     int frames_saved_ = 0;
     std::vector<Vec2> reaction_sum_;
     long reaction_count_ = 0;
+    double largest_energy_ = 0.0;     // [J]
+    double largest_imbalance_ = 0.0;  // [J]
     bool finite_ = true;
 };
 

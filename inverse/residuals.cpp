@@ -127,6 +127,10 @@ void Comparison::add_force_stations(const Experiment& experiment) {
     window_ = smoothing_window * (to_ - from_);
     const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
     const bool sparse = static_cast<int>(rows.x().size()) <= tiles;
+    double peak = 0;
+    for (const double force : rows.y()) {
+        peak = std::max(peak, std::abs(force));
+    }
     const int stations = sparse ? static_cast<int>(rows.x().size()) : tiles;
     for (int i = 0; i < stations; ++i) {
         const double at = sparse ? rows.x()[static_cast<std::size_t>(i)] : from_ + (i + 0.5) * window_;
@@ -134,10 +138,13 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         if (averaged == 0) {
             continue;  // a gap in the data
         }
-        const double slope = (rows.at(at + 0.5 * window_) - rows.at(at - 0.5 * window_)) / std::max(window_, 1e-300);
+        const double before = std::max(from_, at - window_);
+        const double after = std::min(to_, at + window_);
+        const double slope = (force_at(rows, after) - force_at(rows, before)) / (after - before);
         FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
         station.measured = force_at(rows, at);
-        station.sigma = std::hypot(noise, slope * abscissa_noise_) / std::sqrt(averaged);
+        const double of_data = std::hypot(noise, slope * abscissa_noise_) / std::sqrt(averaged);
+        station.sigma = std::hypot(of_data, slope * model_resolution * at, model_resolution * peak);
         stations_.push_back(station);
     }
 }
@@ -175,6 +182,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         const double late = crack.arrival(length + sigma_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
         station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_ / std::sqrt(averaged)), sampling);
+        station.sigma = std::hypot(station.sigma, model_resolution * *arrival);
         stations_.push_back(station);
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());

@@ -220,3 +220,13 @@ TEST(SystemCommand, FullStandardOutputIsAnError) {
     EXPECT_EQ(WEXITSTATUS(std::system(line.c_str())), 2);
     EXPECT_TRUE(contains(command.folder.read("error.txt"), "standard output")) << command.folder.read("error.txt");
 }
+
+// With standard error closed, a file that the run opens could get its number, and messages would go into that file.
+TEST(SystemCommand, RunNeedsNobodyToListen) {
+    Command command;
+    command.folder.write("scene.toml", small_scene);
+    const std::string line =
+        std::string(COMMAND) + " simulate " + command.path("scene.toml") + " -o " + command.path("record.h5") + " 2>&-";
+    ASSERT_EQ(std::system(line.c_str()), 0);
+    EXPECT_EQ(read_record(command.path("record.h5")).status, RunStatus::finished);
+}

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
-#include <regex>
 
 using namespace crampfit;
 
@@ -24,6 +24,13 @@ bool same_bits(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 }
 bool same_bits(double a, double b) { return same_bits(std::vector<double>{a}, std::vector<double>{b}); }
 
+std::vector<double> values_of(std::vector<Instant> series, const SeriesColumn& column) {
+    std::vector<double> values;
+    for (Instant& instant : series)
+        values.push_back(column.value(instant));
+    return values;
+}
+
 }  // namespace
 
 TEST(UnitHdf5, RecordComesBackBitForBit) {
@@ -34,7 +41,8 @@ TEST(UnitHdf5, RecordComesBackBitForBit) {
 
     EXPECT_EQ(after.status, before.status);
     EXPECT_EQ(after.message, before.message);
-    EXPECT_TRUE(same_bits(after.series, before.series));
+    for (const SeriesColumn& column : series_columns)
+        EXPECT_TRUE(same_bits(values_of(after.series, column), values_of(before.series, column))) << column.name;
     EXPECT_EQ(after.tracked_crack, 1);
     ASSERT_EQ(after.paths.size(), 2u);
     EXPECT_TRUE(same_bits(after.paths[0], before.paths[0]));
@@ -155,8 +163,10 @@ TEST(UnitHdf5, FileSaysWhatItIs) {
     EXPECT_EQ(root.attribute("program"), "crampfit");
     EXPECT_EQ(root.attribute("version"), CRAMPFIT_VERSION);
     EXPECT_EQ(root.attribute("kind"), "record");
-    const std::regex iso8601("20\\d\\d-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\dZ");
-    EXPECT_TRUE(std::regex_match(root.attribute("created"), iso8601)) << root.attribute("created");
+    std::string created = root.attribute("created");
+    std::replace_if(
+        created.begin(), created.end(), [](char c) { return c >= '0' && c <= '9'; }, '9');
+    EXPECT_EQ(created, "9999-99-99T99:99:99Z");
     EXPECT_EQ(root.attribute_of("series/force", "units"), "N");
     EXPECT_EQ(root.attribute_of("frames/0001/stress", "units"), "Pa");
     EXPECT_EQ(root.attribute_of("series/K_I", "units"), "Pa sqrt(m)");

@@ -1,0 +1,141 @@
+// Waves, energy, contact: what a run does in motion.
+#include "datasets/error.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::test {
+namespace {
+
+TEST(VerificationWave, StressBehindAPlaneWave) {
+    // A side that starts to move at v sends a plane wave: stress = rho c v behind it (c the pressure-wave speed).
+    Scene scene = block({50e-3, 1e-3}, 0.25e-3);
+    const double v = 0.1;
+    scene.edges = {moving("right", Side::right, {v, 0.0}), moving("top", Side::top, {0.0, 0.0}),
+                   moving("bottom", Side::bottom, {0.0, 0.0})};
+    for (Edge& edge : scene.edges)
+        if (edge.side != Side::right) edge.velocity[0].reset();
+    scene.measure = {"right", "right"};
+    const double M = 40e6 * 0.67 / (1.33 * 0.34);  // E (1 - nu) / ((1 + nu) (1 - 2 nu))
+    const double c = std::sqrt(M / 300.0);
+    scene.stop.time = 30e-3 / c;
+    const Record record = simulate(scene);
+    double mean = 0;
+    int count = 0;
+    for (const Instant& row : record.series) {
+        if (row.time < 0.3 * *scene.stop.time) continue;
+        mean += row.force;
+        ++count;
+    }
+    mean /= count;
+    EXPECT_NEAR(mean, 300.0 * c * v * 1e-3, 0.01 * 300.0 * c * v * 1e-3);  // dispersion rings about the mean
+}
+
+TEST(VerificationWave, ArrivesWhenItShould) {
+    Scene scene = block({50e-3, 1e-3}, 0.25e-3);
+    scene.edges = {moving("right", Side::right, {0.1, 0.0}), moving("left", Side::left, {0.0, 0.0})};
+    scene.materials["EW"].poisson_ratio = 0.0;
+    scene.measure = {"left", "right"};
+    const double c = std::sqrt(40e6 / 300.0);
+    scene.stop.time = 80e-3 / c;
+    const Record record = simulate(scene);
+    const double full = 2 * 300.0 * c * 0.1 * 1e-3;  // a held end doubles the stress
+    double arrival = 0;
+    for (const Instant& row : record.series)
+        if (arrival == 0 && row.force > 0.5 * full) arrival = row.time;
+    EXPECT_NEAR(arrival, 50e-3 / c, 0.02 * 50e-3 / c);  // the front spreads over a few of the 200 cells
+}
+
+TEST(UnitEnergy, BooksCloseWithoutGrowth) {
+    Scene scene = ring_specimen(3e-3, 0.2e-3);
+    scene.solver.damping = 0;
+    scene.stop.time = 2e-4;
+    EXPECT_LT(simulate(scene).worst_energy_imbalance, 0.01);
+}
+
+TEST(UnitRotation, TurnsWithoutStress) {
+    for (const double angle : {0.1, 1.0, 3.0}) {
+        Mat2 turn;
+        turn << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+        const PointState state = elastic_state(turn - Mat2::Identity(), layered({5e7, 2e7}).stiffness(), true);
+        EXPECT_LT(state.stress.norm(), 1e-6);
+    }
+}
+
+// Two wheels on the flanks of a V notch with slope 2, as in the wedge test.
+Scene wedge(double cell) {
+    Scene scene = block({10e-3, 10e-3}, cell);
+    scene.specimen.cutouts = {Polygon{{Vec2(3.5e-3, 10e-3), Vec2(6.5e-3, 10e-3), Vec2(5e-3, 7e-3)}}};
+    scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+    for (const double side : {-1.0, 1.0}) {
+        Body wheel;
+        wheel.name = side < 0 ? "left" : "right";
+        wheel.shape = Circle{Vec2(5e-3 + side * 0.5528e-3, 9.2236e-3), 0.5e-3};
+        wheel.velocity = {0.0, -1.0};
+        wheel.until = 1e-4;
+        scene.bodies.push_back(wheel);
+    }
+    scene.measure = {"left", "left"};
+    scene.solver.damping = 4e4;
+    scene.stop.time = 6e-4;
+    return scene;
+}
+
+TEST(VerificationWedge, ForceStandsNormalToTheFlank) {
+    // Without friction the force on a flank of slope 2 is normal to it: twice as much aside as down (REFERENCES: wedge statics).
+    for (const double cell : {0.2e-3, 0.1e-3}) {
+        const Record record = simulate(wedge(cell));
+        const Vec2 force = record.reactions[1].force.back();
+        std::printf("wheel %2.0f cells across on a flank of slope 2: force ratio %.3f\n", 1e-3 / cell,
+                    std::abs(force.x() / force.y()));
+        // 0.1 mm of travel turns the flank by about a hundredth.
+        EXPECT_NEAR(std::abs(force.x() / force.y()), 2.0, 0.15);
+        EXPECT_LT(force.y(), 0.0);
+        EXPECT_LT(force.x(), 0.0);
+    }
+}
+
+TEST(UnitContact, NeverPulls) {
+    Scene scene = wedge(0.2e-3);
+    for (Body& wheel : scene.bodies) wheel.velocity = {0.0, 1.0};
+    const Record record = simulate(scene);
+    for (const Vec2& force : record.reactions[1].force) EXPECT_LT(force.norm(), 1e-6 * 40e6 * 1e-3);
+}
+
+TEST(UnitContact, ABodyInsideTheSpecimenIsRefused) {
+    Scene scene = wedge(0.2e-3);
+    scene.bodies[0].shape = Circle{Vec2(2e-3, 5e-3), 0.5e-3};
+    try {
+        simulate(scene);
+        FAIL() << "accepted";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.key, "bodies.left");
+    }
+}
+
+TEST(UnitPlan, RefusesWhatItCannotDo) {
+    const auto refused = [](auto change, const std::string& key) {
+        Scene scene = ring_specimen(3e-3, 0.5e-3);
+        change(scene);
+        try {
+            simulate(scene);
+            ADD_FAILURE() << "accepted " << key;
+        } catch (const InputError& error) {
+            EXPECT_EQ(error.key, key);
+            EXPECT_EQ(error.file, "test.toml");
+        }
+    };
+    refused([](Scene& s) { s.solver.kind = SolverKind::quasistatic; }, "solver.kind");
+    refused([](Scene& s) { s.solver.shape_function = ShapeFunction::cpdi; }, "solver.shape_function");
+    refused([](Scene& s) { s.solver.shape_function = ShapeFunction::bspline2; }, "solver.shape_function");
+    refused([](Scene& s) { s.cracks[0].advance = 1e-4; }, "cracks.0.advance");
+    refused([](Scene& s) { s.cracks[0].direction = GrowthDirection::hoop_stress; }, "cracks.0.direction");
+    refused([](Scene& s) { s.cracks[0].faces = {CrackFaces::Kind::friction, 0.3}; }, "cracks.0.faces");
+    refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
+}
+
+}  // namespace
+}  // namespace crampfit::test

@@ -1,0 +1,77 @@
+#pragma once
+
+#include "forward/explicit.hpp"
+#include "forward/simulate.hpp"
+
+#include <memory>
+#include <string>
+
+namespace crampfit::test {
+
+inline IsotropicMaterial earlywood() { return {40e6, 0.33, 300.0, 100.0}; }
+
+inline Edge moving(std::string name, Side side, Vec2 velocity) {
+    Edge edge;
+    edge.name = std::move(name);
+    edge.side = side;
+    edge.velocity = {velocity.x(), velocity.y()};
+    return edge;
+}
+
+inline Edge pulled(std::string name, Side side, Vec2 traction) {
+    Edge edge;
+    edge.name = std::move(name);
+    edge.side = side;
+    edge.traction = traction;
+    return edge;
+}
+
+/// A rectangle of earlywood, 1 m thick, that nothing loads yet.
+inline Scene block(Vec2 size, double cell) {
+    Scene scene;
+    scene.model = {PlaneCondition::strain, 1.0, cell, 4};
+    scene.specimen.size = size;
+    scene.specimen.material = "EW";
+    scene.materials["EW"] = earlywood();
+    scene.file = "test.toml";
+    return scene;
+}
+
+/// Everything that a run needs, kept together so that a test can step through it.
+struct Trial {
+    explicit Trial(const Scene& s)
+        : scene(s), materials(scene), body(scene, materials), plan(make_plan(scene, materials, body)),
+          solver(scene, plan, materials, body) {}
+
+    void until(double time) {
+        while (solver.time() < time) solver.step();
+    }
+
+    Scene scene;
+    MaterialMap materials;
+    Discretisation body;
+    Plan plan;
+    ExplicitSolver solver;
+};
+
+/// The ring specimen of the finite-element reference: 10 x 10 mm, pulled by 0.1 mm, edge crack of length a from the right. The
+/// latewood is made so heavy that both woods have the same wave speed: equilibrium does not feel it, and is reached sooner.
+inline Scene ring_specimen(double crack_length, double cell, bool rings = true) {
+    Scene scene = block({10e-3, 10e-3}, cell);
+    if (rings) {
+        scene.specimen.material.clear();
+        scene.specimen.rings = Rings{Vec2(-20e-3, 5e-3), 2.2e-3, 0.25, 0.0};
+        scene.materials["LW"] = {1200e6, 0.33, 9000.0, 100.0};
+    }
+    scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.edges[0].until = 1e-4;
+    Crack crack;
+    crack.points = {Vec2(10e-3, 5e-3), Vec2(10e-3 - crack_length, 5e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.damping = 4e4;
+    scene.stop.time = 6e-4;  // vibration has died out to 1e-5 by then
+    return scene;
+}
+
+}  // namespace crampfit::test

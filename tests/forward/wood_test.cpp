@@ -1,0 +1,127 @@
+// Shape functions, wood by place, and the grid's layout.
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+namespace crampfit::test {
+namespace {
+
+TEST(UnitShapeFunctions, AddUpToOneAndReproduceALine) {
+    for (const ShapeFunction kind : {ShapeFunction::linear, ShapeFunction::gimp}) {
+        const Vec2 cell(0.3, 0.2), half(0.075, 0.05), place(0.075, 0.15);
+        const CellWeights w = cell_weights(kind, place, cell, half);
+        double sum = 0, x = 0, y = 0, slope = 0;
+        for (int k = 0; k < 4; ++k) {
+            sum += w.value[k];
+            x += w.value[k] * (k % 2) * cell.x();
+            y += w.value[k] * (k / 2) * cell.y();
+            slope += w.slope_x[k] * (k % 2) * cell.x();
+        }
+        EXPECT_NEAR(sum, 1.0, 1e-14);
+        EXPECT_NEAR(x, place.x(), 1e-14);
+        EXPECT_NEAR(y, place.y(), 1e-14);
+        EXPECT_NEAR(slope, 1.0, 1e-13);
+    }
+}
+
+TEST(UnitShapeFunctions, GimpIsTheMeanOfTheHatOverThePointsDomain) {
+    const double h = 1.0, half = 0.25;
+    for (const double offset : {-1.1, -0.9, -0.1, 0.0, 0.2, 0.6, 1.2}) {
+        double value = 0, slope = 0;
+        const int n = 20000;
+        for (int k = 0; k < n; ++k) {
+            const double x = offset - half + 2 * half * (k + 0.5) / n;
+            value += linear_weight(x, h).value / n;
+            slope += linear_weight(x, h).slope / n;
+        }
+        EXPECT_NEAR(gimp_weight(offset, h, half).value, value, 1e-4);
+        EXPECT_NEAR(gimp_weight(offset, h, half).slope, slope, 2e-4);
+    }
+}
+
+TEST(UnitLayers, OneWoodComesBackIsotropic) {
+    const PlaneElasticity wood{5e7, 2e7};
+    LayeredElasticity elasticity = layered(wood);
+    for (const double angle : {0.0, 0.4, 1.3}) {
+        elasticity.normal = {std::cos(angle), std::sin(angle)};
+        Eigen::Matrix3d expected;
+        expected << 9e7, 5e7, 0, 5e7, 9e7, 0, 0, 0, 2e7;
+        EXPECT_LT((elasticity.stiffness() - expected).norm(), 1e-6 * expected.norm());
+    }
+}
+
+TEST(UnitLayers, AcrossTheyYieldInTurnAndAlongTogether) {
+    // Two woods in equal shares with nu = 0: across, 1/E is the mean of 1/E; along, E is the mean of E.
+    LayeredElasticity mean = layered(plane_elasticity(40e6, 0.0, PlaneCondition::strain));
+    mean.coefficients = 0.5 * (mean.coefficients + layered(plane_elasticity(1200e6, 0.0, PlaneCondition::strain)).coefficients);
+    const Eigen::Matrix3d C = mean.stiffness();
+    EXPECT_NEAR(C(0, 0), 2 / (1 / 40e6 + 1 / 1200e6), 1.0);
+    EXPECT_NEAR(C(1, 1), 620e6, 1.0);
+}
+
+Scene ringed(double transition) {
+    Scene scene = ring_specimen(3e-3, 0.1e-3);
+    scene.cracks.clear();
+    scene.specimen.rings->transition = transition;
+    return scene;
+}
+
+TEST(UnitRings, LatewoodStandsWhereTheContractPutsIt) {
+    const Scene scene = ringed(0.0);
+    const MaterialMap map(scene);
+    // r / period = 9.5 + ...: at r = 9.6 periods earlywood, at 9.8 latewood.
+    EXPECT_EQ(map.at(Vec2(-20e-3 + 9.6 * 2.2e-3, 5e-3)).latewood, 0.0);
+    EXPECT_EQ(map.at(Vec2(-20e-3 + 9.8 * 2.2e-3, 5e-3)).latewood, 1.0);
+}
+
+TEST(UnitRings, TransitionFollowsTheDensity) {
+    const Scene scene = ringed(0.44e-3);
+    const MaterialMap map(scene);
+    const double middle = -20e-3 + (9.75 - 0.1) * 2.2e-3;  // half way through a transition of 0.2 periods
+    const LocalWood wood = map.at(Vec2(middle, 5e-3));
+    EXPECT_NEAR(wood.density, 0.5 * (300 + 9000), 1.0);
+    const double power = std::log(30.0) / std::log(30.0);  // E and density both go up 30 times here
+    EXPECT_NEAR(wood.plane_modulus() * (1 - 0.33 * 0.33), 40e6 * std::pow(4650.0 / 300.0, power), 1e3);
+}
+
+TEST(UnitRings, BandsKeepTheirWidthOnAnyGrid) {
+    // The share of latewood among the points is that of the area, not rounded to points.
+    double share[2];
+    for (const int k : {0, 1}) {
+        Scene scene = ringed(0.0);
+        scene.model.cell = k == 0 ? 0.5e-3 : 0.05e-3;
+        const MaterialMap map(scene);
+        const Discretisation body(scene, map);
+        share[k] = std::accumulate(body.points.latewood.begin(), body.points.latewood.end(), 0.0) / body.points.count();
+    }
+    EXPECT_NEAR(share[0], share[1], 0.003);
+}
+
+TEST(UnitLayout, FitsTheSpecimenAndLeavesOutCutouts) {
+    Scene scene = block({10e-3, 5e-3}, 0.12e-3);
+    scene.specimen.cutouts = {Circle{Vec2(5e-3, 2.5e-3), 1e-3}};
+    const MaterialMap map(scene);
+    const Discretisation body(scene, map);
+    EXPECT_NEAR(body.layout.size().x(), 10e-3, 1e-15);
+    EXPECT_NEAR(body.layout.size().y(), 5e-3, 1e-15);
+    double area = 0;
+    for (int p = 0; p < body.points.count(); ++p) {
+        EXPECT_GT((body.points.position[p] - Vec2(5e-3, 2.5e-3)).norm(), 1e-3);
+        area += body.points.volume[p];
+    }
+    EXPECT_NEAR(area, 50e-6 - M_PI * 1e-6, 0.05e-6);
+    double outline = 0;  // of the cutout: its facets lie on the circle and add up to its length
+    for (const Facet& facet : body.facets) {
+        const double r = (facet.position - Vec2(5e-3, 2.5e-3)).norm();
+        if (r > 1.2e-3) continue;
+        EXPECT_NEAR(r, 1e-3, 1e-9);
+        outline += facet.length;
+    }
+    EXPECT_NEAR(outline, 2 * M_PI * 1e-3, 0.3e-3);
+}
+
+}  // namespace
+}  // namespace crampfit::test
