@@ -113,11 +113,12 @@ void ExplicitSolver::close_crack_faces() {
 
 void ExplicitSolver::prescribe_velocities() {
     const double dt = plan_.time_step;
+    const double drag = 0.5 * dt * scene_.solver.damping;
     for (const Held& held : held_) {
         double& v = velocity_[held.field][held.axis];
         const double wanted = mean_velocity_of(held.driver)[held.axis];
         const double before = v - dt * acceleration_[held.field][held.axis];
-        const double force = mass_[held.field] * (wanted - v) / dt;
+        const double force = (1.0 + drag) * mass_[held.field] * (wanted - v) / dt;
         books_.work += force * dt * 0.5 * (before + wanted);
         reaction_[held.driver][held.axis] += force;
         acceleration_[held.field][held.axis] += (wanted - v) / dt;

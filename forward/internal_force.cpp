@@ -24,7 +24,7 @@ void InternalForce::sort_cells() {
 }
 
 template <int PointsPerCell, bool Rotates>
-void InternalForce::add_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
     const Points& points = body_.points;
     std::array<Lane, 4> slope_x, slope_y;
@@ -34,6 +34,7 @@ void InternalForce::add_whole_cells(const std::vector<Vec2>& displacement, std::
             slope_y[k][slot] = body_.weights[slot].slope_y[k];
         }
     }
+    double energy = 0.0;
     for (const int c : whole_cells_) {
         const int first = points.first_of_cell[c];
         const std::array<int, 4>& node = points.node[first];
@@ -65,6 +66,10 @@ void InternalForce::add_whole_cells(const std::vector<Vec2>& displacement, std::
         const Lane local_xx = volume * (C(0) * strain_xx + C(1) * strain_yy + C(4) * shear);
         const Lane local_yy = volume * (C(1) * strain_xx + C(2) * strain_yy + C(5) * shear);
         const Lane local_xy = volume * (C(4) * strain_xx + C(5) * strain_yy + C(3) * shear);
+        if (!force) {
+            energy += 0.5 * (local_xx * strain_xx + local_yy * strain_yy + local_xy * shear).sum();
+            continue;
+        }
         Lane P_xx = local_xx, P_xy = local_xy, P_yx = local_xy, P_yy = local_yy;
         if constexpr (Rotates) {
             P_xx = cosine * local_xx - sine * local_xy;
@@ -73,27 +78,31 @@ void InternalForce::add_whole_cells(const std::vector<Vec2>& displacement, std::
             P_yy = sine * local_xy + cosine * local_yy;
         }
         for (int k = 0; k < 4; ++k) {
-            force[node[k]].x() -= (P_xx * slope_x[k] + P_xy * slope_y[k]).sum();
-            force[node[k]].y() -= (P_yx * slope_x[k] + P_yy * slope_y[k]).sum();
+            (*force)[node[k]].x() -= (P_xx * slope_x[k] + P_xy * slope_y[k]).sum();
+            (*force)[node[k]].y() -= (P_yx * slope_x[k] + P_yy * slope_y[k]).sum();
         }
+    }
+    return energy;
+}
+
+double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+    const auto visit = [&]<int N>() {
+        return rotates_ ? visit_whole_cells<N, true>(displacement, force) : visit_whole_cells<N, false>(displacement, force);
+    };
+    switch (body_.layout.per_side) {
+        case 1: return visit.template operator()<1>();
+        case 2: return visit.template operator()<4>();
+        case 3: return visit.template operator()<9>();
+        case 4: return visit.template operator()<16>();
+        default: return visit.template operator()<25>();
     }
 }
 
 void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
-    const auto whole = [&]<int N>() {
-        rotates_ ? add_whole_cells<N, true>(displacement, force) : add_whole_cells<N, false>(displacement, force);
-    };
-    switch (body_.layout.per_side) {
-        case 1: whole.template operator()<1>(); break;
-        case 2: whole.template operator()<4>(); break;
-        case 3: whole.template operator()<9>(); break;
-        case 4: whole.template operator()<16>(); break;
-        default: whole.template operator()<25>(); break;
-    }
+    visit_whole_cells(displacement, &force);
     const Points& points = body_.points;
     for (const int p : loose_points_) {
-        const PointState state =
-            elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
+        const PointState state = elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
         const CellWeights& w = body_.weights[points.slot[p]];
         for (int k = 0; k < 4; ++k)
             force[points.node[p][k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
@@ -102,8 +111,8 @@ void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>
 
 double InternalForce::energy(const std::vector<Vec2>& displacement) const {
     const Points& points = body_.points;
-    double sum = 0.0;
-    for (int p = 0; p < points.count(); ++p)
+    double sum = visit_whole_cells(displacement, nullptr);
+    for (const int p : loose_points_)
         sum += points.volume[p] *
                elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_).energy;
     return sum;

@@ -22,8 +22,10 @@ class InternalForce {
     double energy(const std::vector<Vec2>& displacement) const;
 
   private:
+    // Adds the forces of the whole cells, or, without `force`, returns their strain energy [J].
     template <int PointsPerCell, bool Rotates>
-    void add_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+    double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
 
     const Discretisation& body_;
     bool rotates_;

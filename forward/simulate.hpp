@@ -16,12 +16,11 @@ struct Progress {
 };
 
 struct SimulateOptions {
-    int threads = 1;                                   // for one run; a fit runs several scenes side by side instead
     std::function<void(const Progress&)> progress;     // called now and then; may be empty
     const std::atomic<bool>* stop_requested = nullptr; // set from outside: the run ends with what it has
 };
 
-/// Runs one scene. A picture or specimen file must have been read into `scene.specimen.map` before.
+/// Runs one scene, on one core: a fit runs several side by side. A picture or specimen file must have been read into `scene.specimen.map` before.
 /// Throws InputError when the scene asks for what no solver here does. A run that goes unstable is a status.
 Record simulate(const Scene& scene, const SimulateOptions& options = {});
 
