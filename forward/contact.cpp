@@ -10,6 +10,10 @@ namespace {
 constexpr int steps_between_searches = 50;
 constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
 
+// Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets the
+// time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
+constexpr double stiffness_in_cells = 10.0;
+
 // How deep x lies in the shape, and which way out. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out) {
     if (const auto* circle = std::get_if<Circle>(&shape)) {
@@ -36,7 +40,7 @@ SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, const s
     std::vector<double> added(mass.size(), 0.0);
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets) {
-        stiffness_.push_back(points.stiffest(f.point) / h * f.length * body.layout.thickness);
+        stiffness_.push_back(stiffness_in_cells * points.stiffest(f.point) / h * f.length * body.layout.thickness);
         for (int k = 0; k < 4; ++k) added[points.node[f.point][k]] += stiffness_.back() * f.weight[k];
     }
     // A facet on a node with hardly any mass must not shorten the time step.

@@ -7,8 +7,7 @@
 namespace crampfit {
 
 /// A rigid body that pushes on the specimen's outline without friction. Each facet inside it is pushed out along the body's
-/// normal by a force that grows with the depth; the stiffness per area is that of one cell of the wood, so
-/// the depth is what one more cell would give way. It never pulls.
+/// normal by a force that grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls.
 class SlidingBody {
   public:
     /// `mass` of the fields [kg]; the springs add at most `most_frequency_squared` to the highest squared frequency [1/s^2].

@@ -139,7 +139,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
     choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",
-           plan.contact ? "penalty of one cell's stiffness, never pulls" : "no body that slides");
+           plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
 
     const double highest = highest_frequency_squared(body);
     plan.added_frequency_squared = plan.contact || !scene.cracks.empty() ? added_stiffness * highest : 0.0;

@@ -26,7 +26,6 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 
 Record simulate_alone(const Scene& scene, const std::atomic<bool>* stop) {
     SimulateOptions options;
-    options.threads = 1;  // the cores are busy with other runs
     options.stop_requested = stop;
     return simulate(scene, options);
 }

@@ -28,7 +28,7 @@ using Forward = std::function<Record(const Scene& scene, const std::atomic<bool>
 
 struct FitOptions {
     int threads = 0;                                    // forward runs side by side; 0: one a core
-    Forward forward;                                    // empty: crampfit::simulate with one thread a run
+    Forward forward;                                    // empty: crampfit::simulate
     std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random

@@ -119,6 +119,18 @@ double Comparison::force_at(const Curve& force, double at) const {
     return force.mean(at - half, at + half);
 }
 
+// What an error of the abscissa, one sigma, does to the force: a quarter of its range within two sigmas, which for a straight line
+// is slope times sigma and near a jump knows of the jump.
+double Comparison::shift_error(const Curve& force, double at, double sigma) const {
+    double low = INFINITY, high = -INFINITY;
+    for (const double shift : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
+        const double value = force_at(force, std::clamp(at + shift * sigma, from_, to_));
+        low = std::min(low, value);
+        high = std::max(high, value);
+    }
+    return 0.25 * (high - low);
+}
+
 void Comparison::add_force_stations(const Experiment& experiment) {
     const Curve rows(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
@@ -138,13 +150,13 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         if (averaged == 0) {
             continue;  // a gap in the data
         }
-        const double before = std::max(from_, at - window_);
-        const double after = std::min(to_, at + window_);
-        const double slope = (force_at(rows, after) - force_at(rows, before)) / (after - before);
         FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
         station.measured = force_at(rows, at);
-        const double of_data = std::hypot(noise, slope * abscissa_noise_) / std::sqrt(averaged);
-        station.sigma = std::hypot(of_data, slope * model_resolution * at, model_resolution * peak);
+        const double of_noise = noise / std::sqrt(averaged);
+        const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
+        const double of_model_place = shift_error(rows, at, model_resolution * at);
+        station.sigma = std::sqrt(of_noise * of_noise + of_data_place * of_data_place + of_model_place * of_model_place +
+                                  model_resolution * peak * model_resolution * peak);
         stations_.push_back(station);
     }
 }

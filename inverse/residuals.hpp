@@ -59,6 +59,7 @@ class Comparison {
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows,
                     const std::optional<double>& given);
     double force_at(const Curve& force, double at) const;
+    double shift_error(const Curve& force, double at, double sigma) const;
 
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
     std::vector<double> abscissa_;  // measured displacement [m] or time [s], a row

@@ -34,16 +34,20 @@ double centre_crack_error(double cells, double shift = 0.0, double lift = 0.0) {
     return run.solver.load_at(0, true).G / G - 1.0;
 }
 
-TEST(VerificationCentreCrack, JConvergesToTheExactValue) {
-    // Asked: 4 % at 10 cells per half crack. The tip shift takes out the first-order error, so that a few cells are enough.
-    for (const auto& [cells, bar] : {std::pair{5.0, 0.04}, {10.0, 0.02}, {20.0, 0.01}}) {
-        const double error = centre_crack_error(cells);
-        std::printf("centre crack, %2.0f cells per half crack: J off by %+.2f %%\n", cells, 100 * error);
-        EXPECT_LT(std::abs(error), bar) << cells << " cells";
-    }
+void check_centre_crack(double cells, double bar) {
+    const double error = centre_crack_error(cells);
+    std::printf("centre crack, %2.0f cells per half crack: J off by %+.2f %%\n", cells, 100 * error);
+    EXPECT_LT(std::abs(error), bar) << cells << " cells";
 }
 
-TEST(VerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
+TEST(VerificationCentreCrack, JConvergesToTheExactValue) {
+    // Asked: 4 % at 10 cells per half crack. The tip shift takes out the first-order error, so that a few cells are enough.
+    for (const auto& [cells, bar] : {std::pair{5.0, 0.04}, {10.0, 0.02}}) check_centre_crack(cells, bar);
+}
+
+TEST(SlowVerificationCentreCrack, JAtTwentyCells) { check_centre_crack(20.0, 0.01); }
+
+TEST(SlowVerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
     for (const double lift : {0.0, 0.5}) {
         for (const double shift : {0.0, 0.25, 0.5, 0.75}) {
             const double error = centre_crack_error(10.0, shift, lift);
