@@ -69,7 +69,7 @@ double scatter(const Curve& rows) {
 
 }  // namespace
 
-Comparison::Comparison(const Experiment& experiment) {
+Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
     const Curves& data = experiment.data;
     by_time_ = !measured(data.displacement);
     if (by_time_ && !measured(data.time)) {
@@ -154,9 +154,9 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         station.measured = force_at(rows, at);
         const double of_noise = noise / std::sqrt(averaged);
         const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
-        const double of_model_place = shift_error(rows, at, model_resolution * at);
+        const double of_model_place = shift_error(rows, at, model_resolution_ * at);
         station.sigma = std::sqrt(of_noise * of_noise + of_data_place * of_data_place + of_model_place * of_model_place +
-                                  model_resolution * peak * model_resolution * peak);
+                                  model_resolution_ * peak * model_resolution_ * peak);
         stations_.push_back(station);
     }
 }
@@ -194,7 +194,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         const double late = crack.arrival(length + sigma_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
         station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_ / std::sqrt(averaged)), sampling);
-        station.sigma = std::hypot(station.sigma, model_resolution * *arrival);
+        station.sigma = std::hypot(station.sigma, model_resolution_ * *arrival);
         stations_.push_back(station);
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());

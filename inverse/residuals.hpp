@@ -36,13 +36,10 @@ class Comparison {
     static constexpr double smoothing_window = 0.02;  // of the measured range
     static constexpr int most_arrivals = 200;
 
-    /// How well the model knows what it says, while it is explicit dynamics: it places an event to this part of the
-    /// displacement, since it knows the tip's G to some 4 % and the displacement goes with sqrt(G), and its vibration
-    /// moves the force by this part of the peak. Both count as errors beside the noise of the data.
-    static constexpr double model_resolution = 0.02;
-
+    /// `model_resolution`: how well the model knows what it says, as a part of the displacement (time) to which it places an
+    /// event and of the peak force that its vibration moves. Both count as errors beside the noise of the data.
     /// Throws InputError, naming the data file, for data with nothing in it to compare.
-    explicit Comparison(const Experiment& experiment);
+    explicit Comparison(const Experiment& experiment, double model_resolution = 0.0);
 
     /// The stations with what was measured at them; `modelled` and `residual` are left at 0.
     const std::vector<FitResidual>& stations() const { return stations_; }
@@ -61,6 +58,7 @@ class Comparison {
     double force_at(const Curve& force, double at) const;
     double shift_error(const Curve& force, double at, double sigma) const;
 
+    double model_resolution_;
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
     std::vector<double> abscissa_;  // measured displacement [m] or time [s], a row
     double abscissa_noise_ = 0;     // one sigma [m] or [s]

@@ -48,13 +48,13 @@ bool finite(const Record& record) {
 
 }  // namespace
 
-StudyModel::StudyModel(const Study& study, Forward forward, const std::atomic<bool>* stop)
+StudyModel::StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop)
     : study_(study), forward_(std::move(forward)), stop_(stop), box_(study.parameters) {
     check_study(study);
     settings_ = find_settings(study);
     std::size_t stations = 0;
     for (const Experiment& experiment : study.experiments) {
-        comparisons_.emplace_back(experiment);
+        comparisons_.emplace_back(experiment, model_resolution);
         stations += comparisons_.back().stations().size();
     }
     if (stations < study.parameters.size()) {

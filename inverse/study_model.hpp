@@ -18,7 +18,7 @@ class StudyModel {
   public:
     /// Throws InputError for what cannot be fitted: bounds, noise, options, keys that no scene has, data with nothing
     /// in it. The study must outlive this.
-    StudyModel(const Study& study, Forward forward, const std::atomic<bool>* stop);
+    StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop);
 
     /// Runs every experiment's scene at x [parameters]. A run that fails, by status or exception, is an unusable
     /// Evaluation.
