@@ -119,8 +119,8 @@ double Comparison::force_at(const Curve& force, double at) const {
     return force.mean(at - half, at + half);
 }
 
-// What an error of the abscissa, one sigma, does to the force: a quarter of its range within two sigmas, which for a straight line
-// is slope times sigma and near a jump knows of the jump.
+// What an error of the abscissa, one sigma, does to the force: its range within two sigmas over their width, times sigma:
+// for a straight line slope times sigma, and near a jump it knows of the jump.
 double Comparison::shift_error(const Curve& force, double at, double sigma) const {
     double low = INFINITY, high = -INFINITY;
     for (const double shift : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
@@ -128,7 +128,8 @@ double Comparison::shift_error(const Curve& force, double at, double sigma) cons
         low = std::min(low, value);
         high = std::max(high, value);
     }
-    return 0.25 * (high - low);
+    const double span = std::min(at + 2 * sigma, to_) - std::max(at - 2 * sigma, from_);
+    return span > 0 ? (high - low) / span * sigma : 0.0;
 }
 
 void Comparison::add_force_stations(const Experiment& experiment) {
