@@ -66,7 +66,7 @@ struct Record {
     std::vector<CrackHistory> cracks;         // every crack but the tracked one, in the scene's order
     std::vector<ReactionHistory> reactions;
 
-    std::vector<Vec2> point_position;         // undeformed [m]; filled when frames are asked for or `keep_points`
+    std::vector<Vec2> point_position;         // undeformed [m]; filled when frames are asked for
     std::vector<float> point_latewood;        // 0 first material .. 1 last material, for pictures
     std::vector<Frame> frames;
 

@@ -16,7 +16,7 @@ constexpr double pair_compliance = 5.0930;
 
 // Where the grid's own crack ends: a crack whose last tied pair lies at x releases the energy of one that ends this part of a cell
 // behind x, because the cells at the tip are stiffer than the near-tip field. Known from G of a centre crack against the exact
-// value at 5, 10, 20 and 40 cells per half crack, where the error is this shift alone (`VerificationCentreCrack`).
+// value at 5, 10 and 20 cells per half crack, where the error is this shift alone (`VerificationCentreCrack`).
 constexpr double tip_shift = 0.19;
 
 // A pair appears once the tip has gone this part of the way across the last cell of the node's support; stiffer ties than
