@@ -53,7 +53,7 @@ double misfit(unsigned n, const double* x, double*, void* data) {
         if (!here) {
             nlopt_force_stop(search.optimizer);
         }
-    } catch (...) {
+    } catch (...) {  // an exception must not cross the C library: kept, and thrown again after it returns
         search.thrown = std::current_exception();
         nlopt_force_stop(search.optimizer);
     }

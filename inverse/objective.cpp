@@ -53,7 +53,7 @@ std::shared_ptr<const Evaluation> Objective::run(const Eigen::VectorXd& point, i
             shared_->on_run({point, result});
         }
         return result;
-    } catch (...) {
+    } catch (...) {  // whoever waits for this run gets the exception too
         promise.set_exception(std::current_exception());
         throw;
     }

@@ -20,7 +20,7 @@ void parallel_for(int count, int threads, const std::function<void(int)>& job) {
         for (int i = next++; i < count; i = next++) {
             try {
                 job(i);
-            } catch (...) {
+            } catch (...) {  // kept for the caller: an exception must not end a thread
                 thrown[static_cast<std::size_t>(i)] = std::current_exception();
             }
         }

@@ -13,6 +13,7 @@ namespace {
 
 TEST(SlowVerificationRings, ReactionAndGAtEquilibrium) {
     std::ifstream table(SHARED_DATA "/ring_reference.csv");
+    // The reference is not part of the project (read in place beside it).
     if (!table) GTEST_SKIP() << "ring_reference.csv is not here";
     std::string line;
     while (std::getline(table, line)) {
@@ -29,6 +30,7 @@ TEST(SlowVerificationRings, ReactionAndGAtEquilibrium) {
                     100 * (reaction / R - 1), 100 * (rate / G - 1));
         EXPECT_NEAR(reaction, R, 0.02 * R) << a;
         // At just three cells J still feels the boundary; the closing note of the release reports that row.
+        // The row at just three cells is printed and not gated: J is low by some 7 % there, a known miss.
         if (distance > 0.301) {
             EXPECT_NEAR(rate, G, 0.05 * G) << a;
         }
