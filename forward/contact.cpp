@@ -7,21 +7,23 @@ namespace crampfit {
 
 namespace {
 
-constexpr int steps_between_searches = 50;
+constexpr int explicit_steps_between_searches = 50;
 constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
 
 // Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets the
 // time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
 constexpr double stiffness_in_cells = 10.0;
 
-// How deep x lies in the shape, and which way out. Nothing outside it.
-bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out) {
+// How deep x lies in the shape, which way out, and how curved. Nothing outside it.
+bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
+    curvature = 0.0;
     if (const auto* circle = std::get_if<Circle>(&shape)) {
         const Vec2 arm = x - circle->centre;
         const double reach = arm.norm();
         if (reach >= circle->radius || reach == 0.0) return false;
         depth = circle->radius - reach;
         out = arm / reach;
+        curvature = 1.0 / reach;
         return true;
     }
     if (!inside(shape, x)) return false;
@@ -33,19 +35,21 @@ bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out) {
 
 } // namespace
 
-SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, const std::vector<double>& mass,
-                         double most_frequency_squared)
-    : shape_(shape), body_(body) {
-    const Points& points = body.points;
-    std::vector<double> added(mass.size(), 0.0);
+SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body) : shape_(shape), body_(body) {
     const double h = body.layout.cell.minCoeff();
-    for (const Facet& f : body.facets) {
-        stiffness_.push_back(stiffness_in_cells * points.stiffest(f.point) / h * f.length * body.layout.thickness);
-        for (int k = 0; k < 4; ++k) added[points.node[f.point][k]] += stiffness_.back() * f.weight[k];
-    }
+    for (const Facet& f : body.facets)
+        stiffness_.push_back(stiffness_in_cells * body.points.stiffest(f.point) / h * f.length * body.layout.thickness);
+}
+
+void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
+    steps_between_searches_ = explicit_steps_between_searches;
+    const Points& points = body_.points;
+    std::vector<double> added(mass.size(), 0.0);
+    for (std::size_t i = 0; i < stiffness_.size(); ++i)
+        for (int k = 0; k < 4; ++k) added[points.node[body_.facets[i].point][k]] += stiffness_[i] * body_.facets[i].weight[k];
     // A facet on a node with hardly any mass must not shorten the time step.
     for (std::size_t i = 0; i < stiffness_.size(); ++i) {
-        const Facet& f = body.facets[i];
+        const Facet& f = body_.facets[i];
         double least = 1.0;
         for (int k = 0; k < 4; ++k) {
             const int n = points.node[f.point][k];
@@ -74,26 +78,33 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
 double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
     double most = 0.0;
     for (const Facet& facet : body_.facets) {
-        double depth = 0.0;
+        double depth = 0.0, curvature = 0.0;
         Vec2 out;
-        if (depth_in(shape_, current(facet, displacement), depth, out)) most = std::max(most, depth);
+        if (depth_in(shape_, current(facet, displacement), depth, out, curvature)) most = std::max(most, depth);
     }
     return most;
 }
 
+std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {
+    if (age_++ % steps_between_searches_ == 0) find_near(moved, displacement);
+    std::vector<Touch> found;
+    for (const int i : near_) {
+        Touch touch{i, stiffness_[i], 0.0, Vec2::Zero(), 0.0};
+        if (depth_in(shape_, current(body_.facets[i], displacement) - moved, touch.depth, touch.normal, touch.curvature))
+            found.push_back(touch);
+    }
+    return found;
+}
+
 Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
-    if (age_++ % steps_between_searches == 0) find_near(moved, displacement);
     Vec2 total = Vec2::Zero();
     stored_energy_ = 0.0;
-    for (const int i : near_) {
-        const Facet& facet = body_.facets[i];
-        double depth = 0.0;
-        Vec2 out;
-        if (!depth_in(shape_, current(facet, displacement) - moved, depth, out)) continue;
-        const Vec2 push = stiffness_[i] * depth * out;
+    for (const Touch& touch : touches(moved, displacement)) {
+        const Facet& facet = body_.facets[touch.facet];
+        const Vec2 push = touch.stiffness * touch.depth * touch.normal;
         for (int k = 0; k < 4; ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
         total += push;
-        stored_energy_ += 0.5 * stiffness_[i] * depth * depth;
+        stored_energy_ += 0.5 * touch.stiffness * touch.depth * touch.depth;
     }
     return total;
 }

@@ -10,11 +10,26 @@ namespace crampfit {
 /// normal by a force that grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls.
 class SlidingBody {
   public:
-    /// `mass` of the fields [kg]; the springs add at most `most_frequency_squared` to the highest squared frequency [1/s^2].
-    SlidingBody(const Shape& shape, const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared);
+    SlidingBody(const Shape& shape, const Discretisation& body);
+
+    /// Softens the springs so that they add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields
+    /// of these masses [kg]. From then on the facets that the body may touch are searched for now and then only.
+    void limit_frequency(const std::vector<double>& mass, double most_frequency_squared);
 
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].
     Vec2 push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
+
+    /// A facet that the body pushes on: with d the depth of its middle, the energy is 1/2 stiffness d^2.
+    struct Touch {
+        int facet;
+        double stiffness;  // [N/m]
+        double depth;      // [m]
+        Vec2 normal;       // unit, out of the body: gradient of -d
+        double curvature;  // of the surfaces of equal depth there, 1 / radius [1/m]
+    };
+
+    /// All facets that the body, gone so far, pushes on.
+    std::vector<Touch> touches(const Vec2& moved, const std::vector<Vec2>& displacement);
 
     double stored_energy() const { return stored_energy_; }  // in the contact's springs [J]
 
@@ -30,6 +45,7 @@ class SlidingBody {
     std::vector<double> stiffness_;  // [facets] [N/m]
     std::vector<int> near_;          // facets that the body may touch before the list is made anew
     int age_ = 0;
+    int steps_between_searches_ = 1;
     double stored_energy_ = 0.0;
 };
 

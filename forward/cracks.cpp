@@ -19,10 +19,6 @@ constexpr double pair_compliance = 5.0930;
 // value at 5, 10 and 20 cells per half crack, where the error is this shift alone (`VerificationCentreCrack`).
 constexpr double tip_shift = 0.19;
 
-// A pair appears once the tip has gone this part of the way across the last cell of the node's support; stiffer ties than
-// at this place would shorten the time step for nothing.
-constexpr double least_freed = 0.15;
-
 // Masks are kept in eight bits.
 constexpr int most_cracks = 8;
 
@@ -70,8 +66,8 @@ Vec2 CrackLine::direction_near(bool at_end, const Vec2& x) const {
     return direction;
 }
 
-CrackFields::CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials)
-    : scene_(scene), body_(body), materials_(materials) {
+CrackFields::CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed)
+    : scene_(&scene), body_(&body), materials_(&materials), least_freed_(least_freed) {
     if (scene.cracks.size() > most_cracks)
         throw InputError(scene.file.string(), "cracks", std::to_string(scene.cracks.size()),
                          "at most " + std::to_string(most_cracks) + " cracks");
@@ -99,19 +95,19 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
 }
 
 bool CrackFields::is_inside(const Vec2& x) const {
-    const Vec2 margin = 1e-6 * body_.layout.cell;
-    const Box rectangle{margin, body_.layout.size() - margin};
-    if (!rectangle.contains(x) || body_.point_at(x) < 0) return false;
+    const Vec2 margin = 1e-6 * body_->layout.cell;
+    const Box rectangle{margin, body_->layout.size() - margin};
+    if (!rectangle.contains(x) || body_->point_at(x) < 0) return false;
     // A tip on the outline of a cutout lies at a free surface, even where a point's corner covers it.
-    const double reach = body_.layout.point_size().maxCoeff();
-    const auto& cutouts = scene_.specimen.cutouts;
+    const double reach = body_->layout.point_size().maxCoeff();
+    const auto& cutouts = scene_->specimen.cutouts;
     return std::none_of(cutouts.begin(), cutouts.end(),
                         [&](const Shape& s) { return inside(s, x) || nearest_on_outline(s, x).distance < 0.5 * reach; });
 }
 
 bool CrackFields::is_left(int crack, const Vec2& x) const {
     const auto& points = lines[crack].points;
-    const double rounding = 1e-9 * body_.layout.cell.minCoeff();  // a node on the crack counts as left of it
+    const double rounding = 1e-9 * body_->layout.cell.minCoeff();  // a node on the crack counts as left of it
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
@@ -134,20 +130,20 @@ bool CrackFields::is_left(int crack, const Vec2& x) const {
 }
 
 double CrackFields::freed(int crack, int node) const {
-    const Vec2 x = body_.layout.node_position(node);
-    const Box support{x - body_.layout.cell, x + body_.layout.cell};
+    const Vec2 x = body_->layout.node_position(node);
+    const Box support{x - body_->layout.cell, x + body_->layout.cell};
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
         if (!tip->inside) continue;
         const auto ahead = exit_distance(tip->position, tip->direction, support);
-        if (ahead) least = std::min(least, 1.0 + tip_shift - *ahead / tip->direction.cwiseAbs().dot(body_.layout.cell));
+        if (ahead) least = std::min(least, 1.0 + tip_shift - *ahead / tip->direction.cwiseAbs().dot(body_->layout.cell));
     }
     return std::max(0.0, least);
 }
 
 void CrackFields::sort_points(int crack, const Box& window) {
-    const Layout& layout = body_.layout;
-    Points& points = body_.points;
+    const Layout& layout = body_->layout;
+    Points& points = body_->points;
     const std::uint8_t bit = static_cast<std::uint8_t>(1u << crack);
     const int first = layout.cell_at(window.low);
     const int last = layout.cell_at(window.high);
@@ -157,7 +153,7 @@ void CrackFields::sort_points(int crack, const Box& window) {
             const std::array<int, 4> nodes = layout.cell_nodes(c);
             for (int k = 0; k < 4; ++k) {
                 const bool node_left = is_left(crack, layout.node_position(nodes[k]));
-                const bool split = freed(crack, nodes[k]) >= least_freed;
+                const bool split = freed(crack, nodes[k]) >= least_freed_;
                 for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
                     const bool apart = is_left(crack, points.position[p]) != node_left;
                     std::uint8_t& mask = mask_[p][k];
@@ -184,8 +180,8 @@ int CrackFields::field(int node, unsigned mask, int crack) {
 }
 
 void CrackFields::add_pairs(int node, unsigned mask) {
-    const Vec2 x = body_.layout.node_position(node);
-    const double plane_modulus = materials_.average(x, 0.5 * body_.layout.cell).plane_modulus();
+    const Vec2 x = body_->layout.node_position(node);
+    const double plane_modulus = materials_->average(x, 0.5 * body_->layout.cell).plane_modulus();
     const int own = field_of_.at({node, mask});
     for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
         const unsigned other_mask = mask ^ (1u << k);
@@ -201,8 +197,8 @@ void CrackFields::add_pairs(int node, unsigned mask) {
 void CrackFields::renew_ties(int crack) {
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
-        const double f = std::max(least_freed, freed(crack, pair.node));
-        pair.tie = (1.0 - f) / f * pair.plane_modulus * body_.layout.thickness / pair_compliance;
+        const double f = std::max(least_freed_, freed(crack, pair.node));
+        pair.tie = (1.0 - f) / f * pair.plane_modulus * body_->layout.thickness / pair_compliance;
     }
 }
 
@@ -215,12 +211,12 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
     tip.direction = step.normalized();
     tip.position = to;
     tip.inside = is_inside(to);
-    line.length += length_inside({from, to}, {Vec2::Zero(), body_.layout.size()});
+    line.length += length_inside({from, to}, {Vec2::Zero(), body_->layout.size()});
     const bool straight = std::abs(cross(old_direction, tip.direction)) < 1e-9;
     if (straight) (at_end ? line.points.back() : line.points.front()) = to;
     else line.points.insert(at_end ? line.points.end() : line.points.begin(), to);
 
-    const Vec2 reach = 3.0 * body_.layout.cell;
+    const Vec2 reach = 3.0 * body_->layout.cell;
     new_fields_.clear();
     sort_points(crack, {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach});
     renew_ties(crack);
@@ -228,7 +224,7 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
 }
 
 Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const {
-    const Layout& layout = body_.layout;
+    const Layout& layout = body_->layout;
     const int c = layout.cell_at(x);
     const std::array<int, 4> nodes = layout.cell_nodes(c);
     const CellWeights weights = cell_weights(ShapeFunction::linear, x - layout.cell_corner(c), layout.cell, {});

@@ -51,7 +51,9 @@ struct FieldPair {
 /// tip has gone, the energy released is 1/2 F^2 c / (1 + s c), which is f times that of the free pair when s = (1 - f) / (f c).
 class CrackFields {
   public:
-    CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials);
+    /// A pair appears once the tip has gone `least_freed` of the way across the last cell of the node's support: with less, the
+    /// tie would be stiffer still, which shortens an explicit time step for nothing.
+    CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed);
 
     struct NewField {
         int field;
@@ -79,9 +81,10 @@ class CrackFields {
     void add_pairs(int node, unsigned mask);
     void renew_ties(int crack);
 
-    const Scene& scene_;
-    Discretisation& body_;
-    const MaterialMap& materials_;
+    const Scene* scene_;
+    Discretisation* body_;
+    const MaterialMap* materials_;
+    double least_freed_;
     std::vector<std::array<std::uint8_t, 4>> mask_;     // [points] bit k: crack k lies between the point and the cell's node
     std::map<std::pair<int, unsigned>, int> field_of_;  // node and mask to field, for masks above 0
     std::vector<NewField> new_fields_;

@@ -16,28 +16,83 @@ struct PointState {
     double energy;       // per undeformed volume [J/m^3]
 };
 
+/// The polar decomposition F = R U in the plane: R is along (F11 + F22, F21 - F12).
+struct Polar {
+    Mat2 turn;     // R
+    Mat2 stretch;  // U
+    double trace;  // of U
+
+    explicit Polar(const Mat2& gradient) {
+        const double c = 2.0 + gradient.trace();
+        const double w = gradient(1, 0) - gradient(0, 1);
+        trace = std::sqrt(c * c + w * w);
+        turn << c / trace, -w / trace, w / trace, c / trace;
+        stretch = turn.transpose() * (gradient + Mat2::Identity());
+    }
+
+    /// Biot strain xx, yy, 2 xy per R^T dF, which is counted xx, xy, yx, yy. From dU = R^T dF - dtheta J U, J a quarter turn, and
+    /// dU symmetric: dtheta = (yx - xy of R^T dF) / tr U.
+    Eigen::Matrix<double, 3, 4> strain_slope() const {
+        const Mat2 u = stretch / trace;
+        Eigen::Matrix<double, 3, 4> B;
+        B << 1, -u(0, 1), u(0, 1), 0,
+             0, u(0, 1), -u(0, 1), 1,
+             0, 2 * u(0, 0), 2 * u(1, 1), 0;
+        return B;
+    }
+};
+
 /// Linear elasticity. With `rotates`, of Biot's strain U - I in the frame that turns with the point (F = R U): the same line for
 /// stretch, and no stress from rotation alone. Without, of the small strain.
 inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates) {
     PointState state;
     state.gradient = gradient;
-    Mat2 turn = Mat2::Identity();
-    if (rotates) {
-        // Polar decomposition in the plane: R is along (F11 + F22, F21 - F12).
-        const double c = 2.0 + gradient.trace();
-        const double w = gradient(1, 0) - gradient(0, 1);
-        const double size = std::sqrt(c * c + w * w);
-        turn << c / size, -w / size, w / size, c / size;
-        state.strain = turn.transpose() * (gradient + Mat2::Identity()) - Mat2::Identity();
-    } else {
+    if (!rotates) {
         state.strain = 0.5 * (gradient + gradient.transpose());
+        const Eigen::Vector3d s = stiffness * Eigen::Vector3d(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1));
+        state.stress << s[0], s[2], s[2], s[1];
+        state.energy = 0.5 * state.stress.cwiseProduct(state.strain).sum();
+        return state;
     }
-    const Eigen::Vector3d s = stiffness * Eigen::Vector3d(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1));
+    const Polar polar(gradient);
+    state.strain = polar.stretch - Mat2::Identity();
+    const Eigen::Vector3d strain(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1));
+    const Eigen::Vector3d s = stiffness * strain;
+    const Eigen::Vector4d p = polar.strain_slope().transpose() * s;
     Mat2 local;
-    local << s[0], s[2], s[2], s[1];
-    state.energy = 0.5 * local.cwiseProduct(state.strain).sum();
-    state.stress = turn * local;
+    local << p[0], p[1], p[2], p[3];
+    state.stress = polar.turn * local;
+    state.energy = 0.5 * s.dot(strain);
     return state;
+}
+
+/// Second derivative of the energy of `elastic_state` by the displacement gradient, counted xx, xy, yx, yy [Pa].
+inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates) {
+    Eigen::Matrix<double, 3, 4> B;
+    if (!rotates) {
+        B << 1, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0;
+        return B.transpose() * stiffness * B;
+    }
+    // In the frame that turns: p = B^T s, so dp = B^T C B dG + dB^T s, and the turning adds dtheta J p. dB comes from dU = B dG.
+    const Polar polar(gradient);
+    B = polar.strain_slope();
+    const Mat2& U = polar.stretch;
+    const double t = polar.trace;
+    const Eigen::Vector3d s = stiffness * Eigen::Vector3d(U(0, 0) - 1.0, U(1, 1) - 1.0, 2.0 * U(0, 1));
+    const Eigen::Vector4d p = B.transpose() * s;
+    const Eigen::RowVector4d dt = B.row(0) + B.row(1);
+    const auto per_trace = [&](double u, const Eigen::RowVector4d& du) { return Eigen::RowVector4d(du / t - u / (t * t) * dt); };
+    const Eigen::RowVector4d d00 = per_trace(U(0, 0), B.row(0));
+    const Eigen::RowVector4d d11 = per_trace(U(1, 1), B.row(1));
+    const Eigen::RowVector4d d01 = per_trace(U(0, 1), 0.5 * B.row(2));
+    Eigen::Matrix4d A = B.transpose() * stiffness * B;
+    A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
+    A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
+    A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
+    Eigen::Matrix4d turn = Eigen::Matrix4d::Zero();  // R^T dF from dF
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) turn.block<2, 2>(2 * i, 2 * j) = polar.turn(j, i) * Mat2::Identity();
+    return turn.transpose() * A * turn;
 }
 
 /// Gradient at a point of a field given at the nodes (a displacement or a velocity).

@@ -9,9 +9,16 @@
 
 namespace crampfit {
 
+namespace {
+
+// Of a pair of fields at a crack tip (CrackFields): a stiffer tie than at this place would shorten the time step for nothing.
+constexpr double least_freed = 0.15;
+
+} // namespace
+
 ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
-    : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials),
-      internal_force_(body, plan.rotates) {
+    : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
+      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());
     velocity_.assign(fields, Vec2::Zero());
@@ -20,9 +27,11 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     reaction_.assign(scene.edges.size() + scene.bodies.size(), Vec2::Zero());
     tip_loads_.resize(2 * cracks_.lines.size());
     last_growth_.assign(2 * cracks_.lines.size(), 0.0);
-    weigh_nodes();
-    hold_nodes();
-    place_tractions();
+    mass_ = field_masses(body, cracks_.fields());
+    for (const Boundary::Held& h : boundary_.held) {
+        velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
+        books_.work += 0.5 * mass_[h.field] * velocity_[h.field][h.axis] * velocity_[h.field][h.axis];
+    }
     place_bodies();
 }
 
@@ -40,7 +49,7 @@ void ExplicitSolver::step() {
 }
 
 void ExplicitSolver::surface_forces() {
-    for (const Traction& t : tractions_) {
+    for (const Boundary::Traction& t : boundary_.tractions) {
         Vec2 velocity = Vec2::Zero();
         for (int k = 0; k < 4; ++k) {
             const int field = body_.points.node[t.facet.point][k];
@@ -58,11 +67,9 @@ void ExplicitSolver::surface_forces() {
 }
 
 double ExplicitSolver::tie_stiffness(const FieldPair& pair) const {
-    // A crack between two rows of nodes has a pair on either: they share the tie as they share the mass beyond the crack.
     const double left = mass_[pair.left];
     const double right = mass_[pair.right];
-    const double share = 4.0 * left * right / ((left + right) * (left + right));
-    return std::min(share * pair.tie, plan_.added_frequency_squared * left * right / (left + right));
+    return std::min(shared_tie(pair, mass_), plan_.added_frequency_squared * left * right / (left + right));
 }
 
 void ExplicitSolver::tie_forces() {
@@ -114,7 +121,7 @@ void ExplicitSolver::close_crack_faces() {
 void ExplicitSolver::prescribe_velocities() {
     const double dt = plan_.time_step;
     const double drag = 0.5 * dt * scene_.solver.damping;
-    for (const Held& held : held_) {
+    for (const Boundary::Held& held : boundary_.held) {
         double& v = velocity_[held.field][held.axis];
         const double wanted = mean_velocity_of(held.driver)[held.axis];
         const double before = v - dt * acceleration_[held.field][held.axis];

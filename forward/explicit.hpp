@@ -1,7 +1,7 @@
 #pragma once
 
+#include "forward/boundary.hpp"
 #include "forward/contact.hpp"
-#include "forward/cracks.hpp"
 #include "forward/energy_release.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/plan.hpp"
@@ -42,31 +42,15 @@ class ExplicitSolver {
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
     const std::vector<Vec2>& reactions() const { return reaction_; }
-    Vec2 moved(int driver) const;
+    Vec2 moved(int driver) const { return boundary_.moved(driver, time_, displacement_); }
 
     bool is_finite() const;
     bool has_left(int crack, bool at_end) const { return !cracks_.lines[crack].tip(at_end).inside; }
 
   private:
-    struct Held {      // a velocity component of a field that an edge or a bonded body prescribes
-        int field;
-        int axis;
-        int driver;
-    };
-    struct Traction {  // a nodal force
-        Facet facet;
-        Vec2 force;    // [N]
-        int driver;
-    };
-
-    void hold_nodes();
-    void place_tractions();
     void place_bodies();
-    void weigh_nodes();
     void adopt(const std::vector<CrackFields::NewField>& fields);
-    Vec2 velocity_of(int driver) const;
     Vec2 mean_velocity_of(int driver) const;
-    double travel_time(int driver) const;
 
     void surface_forces();
     void tie_forces();
@@ -81,6 +65,7 @@ class ExplicitSolver {
     const MaterialMap& materials_;
     Discretisation& body_;
     CrackFields cracks_;
+    Boundary boundary_;
     InternalForce internal_force_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
@@ -92,8 +77,6 @@ class ExplicitSolver {
     std::vector<Vec2> acceleration_;  // [m/s^2]
     std::vector<Vec2> force_;         // [N]
 
-    std::vector<Held> held_;
-    std::vector<Traction> tractions_;
     std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
     std::vector<TipLoad> tip_loads_;
     std::vector<double> last_growth_; // [two a crack] [s]

@@ -48,11 +48,11 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
         }
         const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
         const auto C = [&](int k) { return Eigen::Map<const Lane>(&points.stiffness[k][first]); };
-        Lane cosine, sine, strain_xx, strain_yy, shear;
+        Lane cosine, sine, scale, strain_xx, strain_yy, shear;
         if constexpr (Rotates) {  // elastic_state, written out for many points at once
             const Lane c_part = 2.0 + xx + yy;
             const Lane s_part = yx - xy;
-            const Lane scale = 1.0 / (c_part * c_part + s_part * s_part).sqrt();
+            scale = 1.0 / (c_part * c_part + s_part * s_part).sqrt();
             cosine = c_part * scale;
             sine = s_part * scale;
             strain_xx = cosine * (1.0 + xx) + sine * yx - 1.0;
@@ -71,11 +71,14 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
             continue;
         }
         Lane P_xx = local_xx, P_xy = local_xy, P_yx = local_xy, P_yy = local_yy;
-        if constexpr (Rotates) {
-            P_xx = cosine * local_xx - sine * local_xy;
-            P_xy = cosine * local_xy - sine * local_yy;
-            P_yx = sine * local_xx + cosine * local_xy;
-            P_yy = sine * local_xy + cosine * local_yy;
+        if constexpr (Rotates) {  // B^T s of Polar::strain_slope, turned
+            const Lane skew = scale * (0.5 * shear * (local_yy - local_xx) + (strain_xx - strain_yy) * local_xy);
+            const Lane upper = local_xy + skew;
+            const Lane lower = local_xy - skew;
+            P_xx = cosine * local_xx - sine * lower;
+            P_xy = cosine * upper - sine * local_yy;
+            P_yx = sine * local_xx + cosine * lower;
+            P_yy = sine * upper + cosine * local_yy;
         }
         for (int k = 0; k < 4; ++k) {
             (*force)[node[k]].x() -= (P_xx * slope_x[k] + P_xy * slope_y[k]).sum();

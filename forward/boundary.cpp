@@ -1,0 +1,145 @@
+#include "forward/boundary.hpp"
+
+#include "datasets/error.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace crampfit {
+
+namespace {
+
+bool on_side(const Layout& layout, Side side, const Vec2& x) {
+    const Vec2 near = 1e-6 * layout.cell;
+    switch (side) {
+        case Side::left: return x.x() < near.x();
+        case Side::right: return x.x() > layout.size().x() - near.x();
+        case Side::bottom: return x.y() < near.y();
+        case Side::top: return x.y() > layout.size().y() - near.y();
+    }
+    return false;
+}
+
+bool in_range(const Layout& layout, const Edge& edge, const Vec2& x) {
+    if (!edge.range) return true;
+    const int axis = edge.side == Side::top || edge.side == Side::bottom ? 0 : 1;
+    const double rounding = 1e-6 * layout.cell[axis];
+    return x[axis] >= edge.range->first - rounding && x[axis] <= edge.range->second + rounding;
+}
+
+Shape widened(const Shape& shape, double by) {
+    Shape wide = shape;
+    if (auto* circle = std::get_if<Circle>(&wide)) circle->radius += by;
+    return wide;
+}
+
+} // namespace
+
+std::vector<double> field_masses(const Discretisation& body, int fields) {
+    std::vector<double> mass(fields, 0.0);
+    const Points& points = body.points;
+    for (int p = 0; p < points.count(); ++p)
+        for (int k = 0; k < 4; ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+    return mass;
+}
+
+Boundary::Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks)
+    : scene_(scene), body_(body), edges_(static_cast<int>(scene.edges.size())) {
+    hold_nodes(cracks);
+    place_tractions();
+}
+
+void Boundary::hold_nodes(const CrackFields& cracks) {
+    const Layout& layout = body_.layout;
+    const std::vector<double> mass = field_masses(body_, cracks.fields());
+    std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
+    const auto hold = [&](int node, int axis, int driver) {  // where two meet, the first in the list holds
+        if (taken[node][axis]) return;
+        taken[node][axis] = true;
+        held.push_back({node, axis, driver});
+    };
+    for (int e = 0; e < edges_; ++e) {
+        const Edge& edge = scene_.edges[e];
+        if (edge.traction) continue;
+        int found = 0;
+        for (int n = 0; n < layout.nodes(); ++n) {
+            const Vec2 x = layout.node_position(n);
+            if (mass[n] == 0.0 || !on_side(layout, edge.side, x) || !in_range(layout, edge, x)) continue;
+            ++found;
+            for (int axis = 0; axis < 2; ++axis)
+                if (edge.velocity[axis]) hold(n, axis, e);
+        }
+        if (found == 0)
+            throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no node of the grid lies on this stretch of the side");
+    }
+    for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+        const Body& grip = scene_.bodies[b];
+        if (grip.contact.kind != Contact::Kind::bonded) continue;
+        const Shape shape = widened(grip.shape, 1e-6 * layout.cell.minCoeff());
+        int found = 0;
+        for (int n = 0; n < layout.nodes(); ++n) {
+            if (mass[n] == 0.0 || !inside(shape, layout.node_position(n))) continue;
+            ++found;
+            for (int axis = 0; axis < 2; ++axis) hold(n, axis, edges_ + static_cast<int>(b));
+        }
+        if (found == 0)
+            throw InputError(scene_.file.string(), "bodies." + grip.name, "bonded",
+                             "the body holds no node of the grid: it must overlap the specimen by a cell or so");
+    }
+    // A crack that starts on a held edge has fields there already.
+    const std::size_t on_nodes = held.size();
+    for (int f = layout.nodes(); f < cracks.fields(); ++f)
+        for (std::size_t i = 0; i < on_nodes; ++i)
+            if (held[i].field == cracks.node_of_field[f]) held.push_back({f, held[i].axis, held[i].driver});
+}
+
+void Boundary::place_tractions() {
+    for (int e = 0; e < edges_; ++e) {
+        const Edge& edge = scene_.edges[e];
+        if (!edge.traction) continue;
+        int found = 0;
+        for (const Facet& facet : body_.facets) {
+            if (!on_side(body_.layout, edge.side, facet.position) || !in_range(body_.layout, edge, facet.position)) continue;
+            ++found;
+            tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, e});
+        }
+        if (found == 0)
+            throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no material lies on this stretch of the side");
+    }
+}
+
+void Boundary::adopt(const std::vector<CrackFields::NewField>& fields) {
+    for (const auto& [added, from] : fields) {
+        const std::size_t count = held.size();
+        for (std::size_t i = 0; i < count; ++i)
+            if (held[i].field == from) held.push_back({added, held[i].axis, held[i].driver});
+    }
+}
+
+double Boundary::travel_time(int driver) const {
+    const auto& until = driver < edges_ ? scene_.edges[driver].until : scene_.bodies[driver - edges_].until;
+    return until.value_or(std::numeric_limits<double>::infinity());
+}
+
+Vec2 Boundary::velocity_of(int driver) const {
+    if (driver >= edges_) return scene_.bodies[driver - edges_].velocity;
+    const Edge& edge = scene_.edges[driver];
+    return {edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)};
+}
+
+Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
+
+Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacement) const {
+    if (driver >= edges_ || !scene_.edges[driver].traction) return travel(driver, time);
+    Vec2 sum = Vec2::Zero();
+    double length = 0.0;
+    for (const Traction& t : tractions) {
+        if (t.driver != driver) continue;
+        length += t.facet.length;
+        for (int k = 0; k < 4; ++k)
+            sum += t.facet.length * t.facet.weight[k] * displacement[body_.points.node[t.facet.point][k]];
+    }
+    return sum / length;
+}
+
+} // namespace crampfit

@@ -1,0 +1,62 @@
+#pragma once
+
+#include "forward/cracks.hpp"
+
+#include <vector>
+
+namespace crampfit {
+
+/// What edges and bodies prescribe on the grid's fields. A driver is an edge or a body: the edges first, then the bodies.
+class Boundary {
+  public:
+    struct Held {      // a displacement component of a field that an edge or a bonded body prescribes
+        int field;
+        int axis;
+        int driver;
+    };
+    struct Traction {  // a force on a piece of the outline
+        Facet facet;
+        Vec2 force;    // [N]
+        int driver;
+    };
+
+    /// Throws InputError where an edge or a bonded body meets nothing.
+    Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks);
+
+    std::vector<Held> held;
+    std::vector<Traction> tractions;
+
+    int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
+    int first_body() const { return edges_; }
+
+    /// A new field is held as the one that it comes from.
+    void adopt(const std::vector<CrackFields::NewField>& fields);
+
+    Vec2 velocity_of(int driver) const;                // while it moves [m/s]
+    double travel_time(int driver) const;              // it stops then [s]; infinite: never
+    Vec2 travel(int driver, double time) const;        // how far it has gone, where it is prescribed [m]
+
+    /// How far a driver has gone, prescribed or, under traction, on average over its facets [m].
+    Vec2 moved(int driver, double time, const std::vector<Vec2>& displacement) const;
+
+  private:
+    void hold_nodes(const CrackFields& cracks);
+    void place_tractions();
+
+    const Scene& scene_;
+    const Discretisation& body_;
+    int edges_;
+};
+
+/// Mass of each field [kg]; 0 for fields that no point belongs to.
+std::vector<double> field_masses(const Discretisation& body, int fields);
+
+/// How stiff the tie of a pair is [N/m]. A crack between two rows of nodes has a pair on either: they share the tie as they share
+/// the mass beyond the crack.
+inline double shared_tie(const FieldPair& pair, const std::vector<double>& mass) {
+    const double left = mass[pair.left];
+    const double right = mass[pair.right];
+    return left > 0.0 && right > 0.0 ? 4.0 * left * right / ((left + right) * (left + right)) * pair.tie : 0.0;
+}
+
+} // namespace crampfit

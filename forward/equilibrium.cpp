@@ -1,0 +1,270 @@
+#include "forward/equilibrium.hpp"
+
+#include "forward/deformation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace crampfit {
+
+namespace {
+
+// A pair of fields appears as soon as the tip has gone this part of a cell; its tie is then that much stiffer than the wood.
+constexpr double least_freed = 1e-3;
+
+// Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
+constexpr double face_stiffness_factor = 100.0;
+
+// Newton's method ends when no force out of balance exceeds this part of the largest force on a node.
+constexpr double balance = 1e-9;
+constexpr int most_iterations = 40;
+
+} // namespace
+
+Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
+    : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
+      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates),
+      node_order_(dissection_order(body.layout.cells_x + 1, body.layout.cells_y + 1)) {
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
+        sliding_.emplace_back(scene.bodies[b].shape, body);
+        sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
+    }
+    displacement_.assign(cracks_.fields(), Vec2::Zero());
+    renumber();
+    find_forces();
+}
+
+void Equilibrium::renumber() {
+    const int fields = cracks_.fields();
+    mass_ = field_masses(body_, fields);
+    std::vector<int> order(fields);
+    std::iota(order.begin(), order.end(), 0);
+    const auto place = [&](int field) { return node_order_[cracks_.node_of_field[field]]; };
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
+    equation_.assign(2 * fields, 0);
+    for (const Boundary::Held& held : boundary_.held) equation_[2 * held.field + held.axis] = -1;
+    equations_ = 0;
+    for (const int field : order) {
+        for (int axis = 0; axis < 2; ++axis) {
+            int& equation = equation_[2 * field + axis];
+            if (mass_[field] == 0.0) equation = -1;
+            if (equation == 0) equation = equations_++;
+        }
+    }
+    new_pattern_ = true;
+}
+
+void Equilibrium::grow(int crack, bool at_end, const Vec2& to) {
+    const auto fields = cracks_.grow(crack, at_end, to);
+    for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
+    boundary_.adopt(fields);
+    internal_force_.sort_cells();
+    renumber();
+}
+
+Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
+    const double gap = (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal);
+    if (gap >= 0.0) return Mat2::Zero();
+    const double stiffness = face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
+    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) return stiffness * Mat2::Identity();
+    return stiffness * pair.normal * pair.normal.transpose();
+}
+
+Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const {
+    return shared_tie(pair, mass_) * Mat2::Identity() + face_stiffness(pair);
+}
+
+// Forces out of balance, reactions, and the energies that are not the points'.
+void Equilibrium::find_forces() {
+    force_.assign(displacement_.size(), Vec2::Zero());
+    reaction_.assign(boundary_.drivers(), Vec2::Zero());
+    internal_force_.add(displacement_, force_);
+    face_energy_ = 0.0;
+    for (const FieldPair& pair : cracks_.pairs) {
+        if (mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) continue;
+        const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
+        const Vec2 pull = pair_stiffness(pair) * jump;
+        force_[pair.left] -= pull;
+        force_[pair.right] += pull;
+        face_energy_ += 0.5 * jump.dot(face_stiffness(pair) * jump);
+    }
+    for (const Boundary::Traction& t : boundary_.tractions) {
+        for (int k = 0; k < 4; ++k) force_[body_.points.node[t.facet.point][k]] += t.facet.weight[k] * t.force;
+        reaction_[t.driver] += t.force;
+    }
+    contact_energy_ = 0.0;
+    for (std::size_t i = 0; i < sliding_.size(); ++i) {
+        const int driver = sliding_driver_[i];
+        reaction_[driver] = sliding_[i].push(boundary_.travel(driver, time_), displacement_, force_);
+        contact_energy_ += sliding_[i].stored_energy();
+    }
+    for (const Boundary::Held& held : boundary_.held)
+        if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
+}
+
+void Equilibrium::add_tangent(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& tangent) {
+    for (int b = 0; b < 8; ++b) {
+        const int column_dof = 2 * fields[b / 2] + b % 2;
+        const int column = equation_[column_dof];
+        const double step = prescribed_step_[column_dof];
+        for (int a = 0; a < 8; ++a) {
+            const int row = equation_[2 * fields[a / 2] + a % 2];
+            if (row < 0) continue;
+            if (column < 0) step_load_[row] -= tangent(a, b) * step;
+            else if (row >= column) entries_.emplace_back(row, column, tangent(a, b));
+        }
+    }
+}
+
+void Equilibrium::add_pair(const FieldPair& pair, const Mat2& stiffness) {
+    const std::array<int, 2> field{pair.left, pair.right};
+    for (int side = 0; side < 2; ++side) {
+        for (int other = 0; other < 2; ++other) {
+            const double sign = side == other ? 1.0 : -1.0;
+            for (int i = 0; i < 2; ++i) {
+                for (int j = 0; j < 2; ++j) {
+                    const int row = equation_[2 * field[side] + i];
+                    const int column = equation_[2 * field[other] + j];
+                    if (row >= 0 && column >= 0 && row >= column) entries_.emplace_back(row, column, sign * stiffness(i, j));
+                }
+            }
+        }
+    }
+}
+
+bool Equilibrium::factor_tangent() {
+    const Points& points = body_.points;
+    entries_.clear();
+    step_load_.setZero(equations_);
+    const auto point_tangent = [&](int p) {
+        const CellWeights& w = body_.weights[points.slot[p]];
+        Eigen::Matrix<double, 4, 8> slope = Eigen::Matrix<double, 4, 8>::Zero();  // gradient xx, xy, yx, yy per displacement
+        for (int k = 0; k < 4; ++k) {
+            slope(0, 2 * k) = slope(2, 2 * k + 1) = w.slope_x[k];
+            slope(1, 2 * k) = slope(3, 2 * k + 1) = w.slope_y[k];
+        }
+        const Eigen::Matrix4d A =
+            elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(), points.stiffness_of(p), plan_.rotates);
+        return Eigen::Matrix<double, 8, 8>(points.volume[p] * slope.transpose() * A * slope);
+    };
+    for (int c = 0; c < body_.layout.cells(); ++c) {
+        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+        int p = points.first_of_cell[c];
+        const int last = points.first_of_cell[c + 1];
+        while (p < last) {  // points side by side on the same fields go together
+            const std::array<int, 4>& fields = points.node[p];
+            sum.setZero();
+            for (; p < last && points.node[p] == fields; ++p) sum += point_tangent(p);
+            add_tangent(fields, sum);
+        }
+    }
+    for (const FieldPair& pair : cracks_.pairs)
+        if (mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0) add_pair(pair, pair_stiffness(pair));
+    for (std::size_t i = 0; i < sliding_.size(); ++i) {
+        for (const SlidingBody::Touch& touch : sliding_[i].touches(boundary_.travel(sliding_driver_[i], time_), displacement_)) {
+            const Facet& facet = body_.facets[touch.facet];
+            const Mat2 along = touch.normal * touch.normal.transpose();
+            const Mat2 stiffness = touch.stiffness * (along - touch.depth * touch.curvature * (Mat2::Identity() - along));
+            Eigen::Matrix<double, 8, 8> tangent;
+            for (int a = 0; a < 4; ++a)
+                for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
+            add_tangent(points.node[facet.point], tangent);
+        }
+    }
+    Eigen::SparseMatrix<double> matrix(equations_, equations_);
+    matrix.setFromTriplets(entries_.begin(), entries_.end());
+    ++factorisations_;
+    const bool good = factor_.factor(matrix, new_pattern_);
+    new_pattern_ = false;
+    return good;
+}
+
+double Equilibrium::largest_residual() const {
+    double largest = 0.0;
+    for (std::size_t f = 0; f < force_.size(); ++f)
+        for (int axis = 0; axis < 2; ++axis)
+            if (equation_[2 * f + axis] >= 0) largest = std::max(largest, std::abs(force_[f][axis]));
+    return largest;
+}
+
+void Equilibrium::prescribe(double time) {
+    prescribed_step_.assign(equation_.size(), 0.0);
+    for (const Boundary::Held& held : boundary_.held)
+        prescribed_step_[2 * held.field + held.axis] =
+            boundary_.travel(held.driver, time)[held.axis] - displacement_[held.field][held.axis];
+    time_ = time;
+}
+
+Equilibrium::Outcome Equilibrium::solve(double time) {
+    prescribe(time);
+    const bool linear = !plan_.rotates && sliding_.empty();
+    for (int iteration = 0; iteration < most_iterations; ++iteration) {
+        find_forces();
+        if (!factor_tangent()) return Outcome::mechanism;
+        Eigen::VectorXd right = step_load_;
+        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+            if (equation_[dof] >= 0) right[equation_[dof]] += force_[dof / 2][dof % 2];
+        const Eigen::VectorXd step = factor_.solve(right);
+        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+            displacement_[dof / 2][dof % 2] += equation_[dof] >= 0 ? step[equation_[dof]] : prescribed_step_[dof];
+        std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
+        find_forces();
+        double scale = 0.0;
+        for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
+        if (!(scale < INFINITY)) return Outcome::not_converged;
+        if (largest_residual() <= balance * scale || (scale == 0.0 && linear)) return Outcome::solved;
+    }
+    return Outcome::not_converged;
+}
+
+double Equilibrium::strain_energy() const {
+    double energy = internal_force_.energy(displacement_);
+    for (const FieldPair& pair : cracks_.pairs)
+        energy += 0.5 * shared_tie(pair, mass_) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
+    return energy;
+}
+
+double Equilibrium::potential() const {
+    double potential = strain_energy() + contact_energy_ + face_energy_;
+    for (const Boundary::Traction& t : boundary_.tractions)
+        for (int k = 0; k < 4; ++k)
+            potential -= t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+    return potential;
+}
+
+double Equilibrium::power() const {
+    double power = 0.0;
+    for (int driver = 0; driver < boundary_.drivers(); ++driver)
+        if (time_ < boundary_.travel_time(driver)) power += reaction_[driver].dot(boundary_.velocity_of(driver));
+    return power;
+}
+
+TipLoad Equilibrium::load_at(int crack, bool at_end) const {
+    EnergyReleaseOptions options;
+    options.rotates = plan_.rotates;
+    const std::vector<Vec2> still(displacement_.size(), Vec2::Zero());
+    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, still, still}, options);
+}
+
+Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, displacement_, time_}; }
+
+void Equilibrium::restore(const Snapshot& snapshot) {
+    cracks_ = snapshot.cracks;
+    body_.points.node = snapshot.node;
+    boundary_.held = snapshot.held;
+    displacement_ = snapshot.displacement;
+    time_ = snapshot.time;
+    internal_force_.sort_cells();
+    renumber();
+    find_forces();
+}
+
+void Equilibrium::set_displacements(const std::vector<Vec2>& displacement, double time) {
+    displacement_ = displacement;
+    time_ = time;
+    find_forces();
+}
+
+} // namespace crampfit

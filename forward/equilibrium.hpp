@@ -1,0 +1,96 @@
+#pragma once
+
+#include "forward/boundary.hpp"
+#include "forward/contact.hpp"
+#include "forward/energy_release.hpp"
+#include "forward/internal_force.hpp"
+#include "forward/plan.hpp"
+#include "forward/sparse_factor.hpp"
+
+#include <vector>
+
+namespace crampfit {
+
+/// Static equilibrium of points, grid, crack fields and bodies for given crack tips: the displacement that makes the potential
+///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions
+/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent.
+class Equilibrium {
+  public:
+    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
+
+    enum class Outcome { solved, not_converged, mechanism };  // mechanism: something can move without resistance
+
+    /// From where it stands, solves for what the boundary prescribes at `time`.
+    Outcome solve(double time);
+
+    /// Moves a crack tip. The displacement stays, new fields start with that of the field that they come from; `solve` next.
+    void grow(int crack, bool at_end, const Vec2& to);
+
+    double time() const { return time_; }
+    const CrackFields& cracks() const { return cracks_; }
+    const Boundary& boundary() const { return boundary_; }
+    const std::vector<Vec2>& displacements() const { return displacement_; }
+
+    double potential() const;                      // Pi [J]
+    double strain_energy() const;                  // in the points and in the ties [J]
+    const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
+    double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
+    TipLoad load_at(int crack, bool at_end) const;
+    double reciprocal_condition() const { return factor_.reciprocal_condition(); }
+    int factorisations() const { return factorisations_; }
+
+    /// Everything that growth and solution change, to come back to.
+    struct Snapshot {
+        CrackFields cracks;
+        std::vector<std::array<int, 4>> node;
+        std::vector<Boundary::Held> held;
+        std::vector<Vec2> displacement;
+        double time;
+    };
+    Snapshot save() const;
+    void restore(const Snapshot& snapshot);
+    void set_displacements(const std::vector<Vec2>& displacement, double time);
+
+  private:
+    void renumber();
+    void find_forces();
+    bool factor_tangent();
+    void add_tangent(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& tangent);
+    void add_pair(const FieldPair& pair, const Mat2& stiffness);
+    Mat2 pair_stiffness(const FieldPair& pair) const;
+    Mat2 face_stiffness(const FieldPair& pair) const;
+    double largest_residual() const;
+    void prescribe(double time);
+
+    const Scene& scene_;
+    const Plan& plan_;
+    Discretisation& body_;
+    const MaterialMap& materials_;
+    CrackFields cracks_;
+    Boundary boundary_;
+    InternalForce internal_force_;
+    std::vector<SlidingBody> sliding_;
+    std::vector<int> sliding_driver_;
+
+    // One entry a field.
+    std::vector<double> mass_;        // [kg]
+    std::vector<Vec2> displacement_;  // [m]
+    std::vector<Vec2> force_;         // out of balance [N]
+
+    std::vector<Vec2> reaction_;      // [drivers] [N]
+    double contact_energy_ = 0;       // [J]
+    double face_energy_ = 0;          // [J]
+    double time_ = 0;                 // [s]
+
+    std::vector<int> node_order_;     // [nodes] place in the elimination
+    std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points
+    int equations_ = 0;
+    bool new_pattern_ = true;
+    std::vector<Eigen::Triplet<double>> entries_;
+    std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
+    Eigen::VectorXd step_load_;       // what that puts on the equations [N]
+    SparseFactor factor_;
+    int factorisations_ = 0;
+};
+
+} // namespace crampfit
