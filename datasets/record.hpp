@@ -47,6 +47,17 @@ struct ReactionHistory {
     std::vector<Vec2> force;      // [N]
 };
 
+/// One place of the crack on the way that it took, whether it stood there or jumped over it: the load at which it moves on from
+/// there. In equilibrium only.
+struct CriticalLoad {
+    double crack_length = 0;      // of the crack that moves on [m]
+    Vec2 tip = Vec2::Zero();      // its tip [m]
+    double displacement = 0;      // at which it moves on [m]; infinite: it does not
+    double force = 0;             // then [N]
+    double G = 0;                 // energy release rate at the tip, then [J/m^2]
+    double toughness = 0;         // mean over the next `advance` [J/m^2]
+};
+
 /// The points at one instant. Vectors are per point, in the order of `Record::point_position`.
 struct Frame {
     double time = 0;                          // [s]
@@ -65,6 +76,7 @@ struct Record {
     int tracked_crack = 0;                    // whose length, tip, G and K the series holds: an index into `paths`
     std::vector<CrackHistory> cracks;         // every crack but the tracked one, in the scene's order
     std::vector<ReactionHistory> reactions;
+    std::vector<CriticalLoad> driving;        // by crack length; the series is what rising displacement makes of it
 
     std::vector<Vec2> point_position;         // undeformed [m]; filled when frames are asked for
     std::vector<float> point_latewood;        // 0 first material .. 1 last material, for pictures

@@ -35,6 +35,33 @@ Shape widened(const Shape& shape, double by) {
 
 } // namespace
 
+Gauges::Gauges(const Scene& scene) {
+    const int edges = static_cast<int>(scene.edges.size());
+    const auto driver_named = [&](const std::string& name) {
+        for (int e = 0; e < edges; ++e)
+            if (scene.edges[e].name == name) return e;
+        for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+            if (scene.bodies[b].name == name) return edges + static_cast<int>(b);
+        return 0;
+    };
+    const auto direction_of = [&](int driver) {
+        Vec2 drive = Vec2::Zero();
+        if (driver >= edges) {
+            if (driver - edges < static_cast<int>(scene.bodies.size())) drive = scene.bodies[driver - edges].velocity;
+        } else if (scene.edges[driver].traction) {
+            drive = *scene.edges[driver].traction;
+        } else {
+            drive = {scene.edges[driver].velocity[0].value_or(0.0), scene.edges[driver].velocity[1].value_or(0.0)};
+        }
+        return drive.isZero() ? drive : Vec2(drive.normalized());
+    };
+    displacement = driver_named(scene.measure.displacement);
+    displacement_direction = direction_of(displacement);
+    force = driver_named(scene.measure.force);
+    force_direction = direction_of(force);
+    if (force_direction.isZero()) force_direction = -displacement_direction;  // a fixed support feels the opposite of the load
+}
+
 std::vector<double> field_masses(const Discretisation& body, int fields) {
     std::vector<double> mass(fields, 0.0);
     const Points& points = body.points;

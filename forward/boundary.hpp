@@ -48,6 +48,16 @@ class Boundary {
     int edges_;
 };
 
+/// What is measured: which drivers, and along which directions.
+struct Gauges {
+    explicit Gauges(const Scene& scene);
+
+    int force = 0;                 // driver
+    int displacement = 0;          // driver
+    Vec2 force_direction;          // unit; zero: nothing is driven
+    Vec2 displacement_direction;   // unit; zero: nothing is driven
+};
+
 /// Mass of each field [kg]; 0 for fields that no point belongs to.
 std::vector<double> field_masses(const Discretisation& body, int fields);
 

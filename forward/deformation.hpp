@@ -66,8 +66,9 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
     return state;
 }
 
-/// Second derivative of the energy of `elastic_state` by the displacement gradient, counted xx, xy, yx, yy [Pa].
-inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates) {
+/// Second derivative of the energy of `elastic_state` by the displacement gradient, counted xx, xy, yx, yy [Pa]; without `geometric`
+/// only the part that is never negative, which leaves out that stress turns with the point.
+inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates, bool geometric = true) {
     Eigen::Matrix<double, 3, 4> B;
     if (!rotates) {
         B << 1, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0;
@@ -86,12 +87,13 @@ inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix
     const Eigen::RowVector4d d11 = per_trace(U(1, 1), B.row(1));
     const Eigen::RowVector4d d01 = per_trace(U(0, 1), 0.5 * B.row(2));
     Eigen::Matrix4d A = B.transpose() * stiffness * B;
-    A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
-    A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
-    A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
     Eigen::Matrix4d turn = Eigen::Matrix4d::Zero();  // R^T dF from dF
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 2; ++j) turn.block<2, 2>(2 * i, 2 * j) = polar.turn(j, i) * Mat2::Identity();
+    if (!geometric) return turn.transpose() * A * turn;
+    A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
+    A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
+    A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
     return turn.transpose() * A * turn;
 }
 

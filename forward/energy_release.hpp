@@ -16,7 +16,7 @@ struct TipLoad {
     double G = 0;             // energy release rate [J/m^2]
     double K_I = 0;           // [Pa sqrt(m)]
     double K_II = 0;          // [Pa sqrt(m)]
-    Vec2 opening;             // displacement jump just behind the tip, the left face less the right [m]
+    Vec2 opening = Vec2::Zero();  // displacement jump just behind the tip, the left face less the right [m]
     double toughness = 0;     // of the wood at the tip [J/m^2]
 };
 

@@ -17,14 +17,18 @@ constexpr double least_freed = 1e-3;
 constexpr double face_stiffness_factor = 100.0;
 
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node.
-constexpr double balance = 1e-9;
+constexpr double balance = 1e-7;
 constexpr int most_iterations = 40;
+constexpr int most_trials = 12;  // of a part of a Newton step
+
+// No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
+constexpr double least_strain = 1e-5;
 
 } // namespace
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates),
+      boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, plan.rotates),
       node_order_(dissection_order(body.layout.cells_x + 1, body.layout.cells_y + 1)) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
@@ -32,6 +36,9 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
     }
     displacement_.assign(cracks_.fields(), Vec2::Zero());
+    double stiffest = 0.0;
+    for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
+    least_force_ = least_strain * stiffest * body.layout.cell.maxCoeff() * body.layout.thickness;
     renumber();
     find_forces();
 }
@@ -56,12 +63,13 @@ void Equilibrium::renumber() {
     new_pattern_ = true;
 }
 
-void Equilibrium::grow(int crack, bool at_end, const Vec2& to) {
+std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, const Vec2& to) {
     const auto fields = cracks_.grow(crack, at_end, to);
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
     boundary_.adopt(fields);
     internal_force_.sort_cells();
     renumber();
+    return fields;
 }
 
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
@@ -134,7 +142,7 @@ void Equilibrium::add_pair(const FieldPair& pair, const Mat2& stiffness) {
     }
 }
 
-bool Equilibrium::factor_tangent() {
+bool Equilibrium::factor_tangent(bool geometric) {
     const Points& points = body_.points;
     entries_.clear();
     step_load_.setZero(equations_);
@@ -146,7 +154,8 @@ bool Equilibrium::factor_tangent() {
             slope(1, 2 * k) = slope(3, 2 * k + 1) = w.slope_y[k];
         }
         const Eigen::Matrix4d A =
-            elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(), points.stiffness_of(p), plan_.rotates);
+            elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(), points.stiffness_of(p), plan_.rotates,
+                            geometric);
         return Eigen::Matrix<double, 8, 8>(points.volume[p] * slope.transpose() * A * slope);
     };
     for (int c = 0; c < body_.layout.cells(); ++c) {
@@ -166,7 +175,8 @@ bool Equilibrium::factor_tangent() {
         for (const SlidingBody::Touch& touch : sliding_[i].touches(boundary_.travel(sliding_driver_[i], time_), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const Mat2 along = touch.normal * touch.normal.transpose();
-            const Mat2 stiffness = touch.stiffness * (along - touch.depth * touch.curvature * (Mat2::Identity() - along));
+            const double turning = geometric ? touch.depth * touch.curvature : 0.0;
+            const Mat2 stiffness = touch.stiffness * (along - turning * (Mat2::Identity() - along));
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
@@ -197,24 +207,63 @@ void Equilibrium::prescribe(double time) {
     time_ = time;
 }
 
+// Slope of the potential along a step of the equations' unknowns [J].
+double Equilibrium::slope_along(const Eigen::VectorXd& step) const {
+    double slope = 0.0;
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) slope -= force_[dof / 2][dof % 2] * step[equation_[dof]];
+    return slope;
+}
+
+void Equilibrium::move(const Eigen::VectorXd& step, double share) {
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) displacement_[dof / 2][dof % 2] += share * step[equation_[dof]];
+}
+
+// A full Newton step, or less of it where contact changes so much on the way that the potential has long been rising again.
+void Equilibrium::take_step(const Eigen::VectorXd& step) {
+    const double at_start = slope_along(step);
+    double low = 0.0, high = 1.0, at_low = at_start, gone = 1.0;
+    move(step, 1.0);
+    find_forces();
+    double here = slope_along(step);
+    for (int trial = 0; trial < most_trials && std::abs(here) > 0.5 * std::abs(at_start) && (here > 0.0 || high < 1.0); ++trial) {
+        double at_high = here;
+        (here > 0.0 ? high : low) = gone;
+        if (here <= 0.0) at_low = here;
+        // Between the secant's zero and the middle: safe, and quick where the slope is nearly straight.
+        const double secant = here > 0.0 ? low - at_low * (high - low) / (at_high - at_low) : 0.5 * (low + high);
+        const double next = std::clamp(secant, low + 0.1 * (high - low), high - 0.1 * (high - low));
+        move(step, next - gone);
+        gone = next;
+        find_forces();
+        here = slope_along(step);
+    }
+}
+
 Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
-    const bool linear = !plan_.rotates && sliding_.empty();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
-        if (!factor_tangent()) return Outcome::mechanism;
+        // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
+        if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         Eigen::VectorXd right = step_load_;
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
             if (equation_[dof] >= 0) right[equation_[dof]] += force_[dof / 2][dof % 2];
         const Eigen::VectorXd step = factor_.solve(right);
-        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-            displacement_[dof / 2][dof % 2] += equation_[dof] >= 0 ? step[equation_[dof]] : prescribed_step_[dof];
-        std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
-        find_forces();
-        double scale = 0.0;
+        const bool moves_boundary = std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
+        if (moves_boundary) {
+            for (std::size_t dof = 0; dof < equation_.size(); ++dof) displacement_[dof / 2][dof % 2] += prescribed_step_[dof];
+            std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
+            move(step, 1.0);
+            find_forces();
+        } else {
+            take_step(step);
+        }
+        double scale = least_force_;
         for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
         if (!(scale < INFINITY)) return Outcome::not_converged;
-        if (largest_residual() <= balance * scale || (scale == 0.0 && linear)) return Outcome::solved;
+        if (largest_residual() <= balance * scale) return Outcome::solved;
     }
     return Outcome::not_converged;
 }
@@ -226,12 +275,18 @@ double Equilibrium::strain_energy() const {
     return energy;
 }
 
-double Equilibrium::potential() const {
-    double potential = strain_energy() + contact_energy_ + face_energy_;
+double Equilibrium::traction_work() const {
+    double work = 0.0;
     for (const Boundary::Traction& t : boundary_.tractions)
         for (int k = 0; k < 4; ++k)
-            potential -= t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
-    return potential;
+            work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+    return work;
+}
+
+double Equilibrium::potential() const { return strain_energy() + contact_energy_ + face_energy_ - traction_work(); }
+
+double Equilibrium::measured_displacement(double time) const {
+    return boundary_.moved(gauges_.displacement, time, displacement_).dot(gauges_.displacement_direction);
 }
 
 double Equilibrium::power() const {

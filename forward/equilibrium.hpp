@@ -24,7 +24,8 @@ class Equilibrium {
     Outcome solve(double time);
 
     /// Moves a crack tip. The displacement stays, new fields start with that of the field that they come from; `solve` next.
-    void grow(int crack, bool at_end, const Vec2& to);
+    /// Returns those.
+    std::vector<CrackFields::NewField> grow(int crack, bool at_end, const Vec2& to);
 
     double time() const { return time_; }
     const CrackFields& cracks() const { return cracks_; }
@@ -33,6 +34,8 @@ class Equilibrium {
 
     double potential() const;                      // Pi [J]
     double strain_energy() const;                  // in the points and in the ties [J]
+    double traction_work() const;                  // traction times displacement [J]
+    double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
     TipLoad load_at(int crack, bool at_end) const;
@@ -54,12 +57,15 @@ class Equilibrium {
   private:
     void renumber();
     void find_forces();
-    bool factor_tangent();
+    bool factor_tangent(bool geometric);
     void add_tangent(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& tangent);
     void add_pair(const FieldPair& pair, const Mat2& stiffness);
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
     double largest_residual() const;
+    double slope_along(const Eigen::VectorXd& step) const;
+    void move(const Eigen::VectorXd& step, double share);
+    void take_step(const Eigen::VectorXd& step);
     void prescribe(double time);
 
     const Scene& scene_;
@@ -68,6 +74,7 @@ class Equilibrium {
     const MaterialMap& materials_;
     CrackFields cracks_;
     Boundary boundary_;
+    Gauges gauges_;
     InternalForce internal_force_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
@@ -78,6 +85,7 @@ class Equilibrium {
     std::vector<Vec2> force_;         // out of balance [N]
 
     std::vector<Vec2> reaction_;      // [drivers] [N]
+    double least_force_ = 0;          // [N]
     double contact_energy_ = 0;       // [J]
     double face_energy_ = 0;          // [J]
     double time_ = 0;                 // [s]

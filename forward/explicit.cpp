@@ -1,5 +1,7 @@
 #include "forward/explicit.hpp"
 
+#include "forward/growth.hpp"
+
 #include "datasets/error.hpp"
 
 #include <fmt/format.h>
@@ -178,13 +180,7 @@ void ExplicitSolver::grow_cracks() {
             if (time_ - last < increment / rayleigh) continue;
             last = time_;
 
-            Vec2 direction = tip.direction;
-            if (scene_.cracks[k].direction == GrowthDirection::normal_to_opening) {
-                // Normal to the opening displacement (Nairn 2007), on the side that lies ahead.
-                const Vec2 normal = left_of(load.opening);
-                if (std::abs(normal.dot(tip.direction)) > 0.1 * normal.norm())
-                    direction = normal.normalized() * (normal.dot(tip.direction) > 0 ? 1.0 : -1.0);
-            }
+            const Vec2 direction = growth_direction(scene_.cracks[k].direction, tip, load);
             books_.fracture += load.toughness * increment * body_.layout.thickness;
             adopt(cracks_.grow(k, at_end, tip.position + increment * direction));
         }

@@ -15,11 +15,20 @@ namespace {
 
 // Rotations above this give a small-strain model a false strain of half their square: 2e-4, a hundredth of the strain at
 // which earlywood cracks.
-constexpr double most_rotation = 0.02;
+constexpr double most_rotation = 0.06;
+
+// Loading that takes this many transits of a wave is taken for equilibrium: inertia then adds its inverse square to the energy.
+constexpr double slow_loading = 100.0;
+
+// Where no stop condition says how far the load goes: about the strain at which earlywood cracks.
+constexpr double cracking_strain = 0.02;
 
 // Part of the stable time step that is used. Contact and ties may add `added_stiffness` to the squared highest frequency.
 constexpr double courant = 0.95;
 constexpr double added_stiffness = 0.3;
+
+// Seconds for one assembly and factorisation over nodes^1.5 (nested dissection; George 1973); the tests' output shows it.
+constexpr double seconds_per_node = 7e-8;
 
 // Point steps a second on one core, for the estimate of seconds only; `benchmark_forward` measures it.
 constexpr double expected_speed = 4e7;
@@ -28,18 +37,24 @@ void refuse(const Scene& scene, const std::string& key, const std::string& value
     throw InputError(scene.file.string(), key, value, rule);
 }
 
-void check_solver(const Scene& scene) {
-    if (scene.solver.kind == SolverKind::quasistatic)
-        refuse(scene, "solver.kind", "quasistatic", "not available in this version; use \"auto\" or \"explicit\"");
+void check_solver(const Scene& scene, bool quasistatic) {
+    const std::string other = quasistatic ? "quasistatic" : "explicit";
     if (scene.solver.shape_function == ShapeFunction::bspline2 || scene.solver.shape_function == ShapeFunction::cpdi)
         refuse(scene, "solver.shape_function", scene.solver.shape_function == ShapeFunction::cpdi ? "cpdi" : "bspline2",
                "not available in this version; use \"auto\", \"gimp\" or \"linear\"");
+    if (quasistatic && scene.solver.damping > 0.0)
+        refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping), "equilibrium has no motion to damp; leave it out");
+    int tips = 0;
+    for (const Crack& crack : scene.cracks) tips += crack.grows == Growth::both ? 2 : crack.grows != Growth::none;
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
         const Crack& crack = scene.cracks[k];
         const std::string key = "cracks." + std::to_string(k);
-        if (crack.advance > 0.0)
+        if (crack.advance > 0.0 && crack.grows != Growth::none && !quasistatic)
             refuse(scene, key + ".advance", fmt::format("{} mm", crack.advance * 1e3),
-                   "only 0 mm (G at the tip itself) is available in this version");
+                   "explicit dynamics knows only 0 mm (G at the tip itself); give that, or solver.kind = \"quasistatic\"");
+        if (crack.advance > 0.0 && crack.grows != Growth::none && tips > 1)
+            refuse(scene, key + ".advance", fmt::format("{} mm", crack.advance * 1e3),
+                   "with several growing tips only 0 mm (G at the tips themselves) is available in this version");
         if (crack.direction == GrowthDirection::hoop_stress || crack.direction == GrowthDirection::energy_release_rate)
             refuse(scene, key + ".direction",
                    crack.direction == GrowthDirection::hoop_stress ? "hoop stress" : "energy release rate",
@@ -106,20 +121,63 @@ double farthest_motion(const Scene& scene, double end) {
     return farthest;
 }
 
+// What moves, how fast, until when.
+struct Travel {
+    double fastest = 0.0;                                      // [m/s]
+    double until = std::numeric_limits<double>::infinity();    // all stand still from then on [s]
+    bool together = true;                                      // until the same time
+};
+
+Travel travel_of(const Scene& scene) {
+    Travel travel;
+    double last = 0.0;
+    double first = std::numeric_limits<double>::infinity();
+    const auto consider = [&](const auto& driver) {
+        if (speed_of(driver) == 0.0) return;
+        travel.fastest = std::max(travel.fastest, speed_of(driver));
+        const double until = driver.until.value_or(std::numeric_limits<double>::infinity());
+        first = std::min(first, until);
+        last = std::max(last, until);
+    };
+    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
+    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
+    if (travel.fastest > 0.0) travel.until = last;
+    travel.together = travel.fastest == 0.0 || first == last;
+    return travel;
+}
+
 } // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
-    check_solver(scene);
     Plan plan;
     const auto choose = [&](std::string part, std::string choice, std::string reason) {
         plan.choices.push_back({std::move(part), std::move(choice), std::move(reason)});
     };
     plan.end_time = end_time(scene);
+    double slowest = std::numeric_limits<double>::infinity();
+    for (int p = 0; p < body.points.count(); ++p)
+        slowest = std::min(slowest, std::sqrt(body.points.stiffest(p) / body.points.density(p)));
+    const Travel travel = travel_of(scene);
+    const double loading = std::isfinite(plan.end_time) ? std::min(plan.end_time, travel.until)
+                           : travel.fastest > 0.0       ? cracking_strain * scene.specimen.size.minCoeff() / travel.fastest
+                                                        : 0.0;
+    plan.slowness = loading * slowest / scene.specimen.size.maxCoeff();
+    plan.driven = travel.fastest > 0.0;
+    plan.still_from = travel.until;
+    plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
+                       (scene.solver.kind == SolverKind::automatic && plan.slowness > slow_loading && scene.solver.damping == 0.0);
+    check_solver(scene, plan.quasistatic);
 
     const double smallest = scene.specimen.size.minCoeff();
     const double motion = farthest_motion(scene, plan.end_time);
+    const bool slides = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                    [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
     plan.rotates = motion > most_rotation * smallest;
-    choose("solver", "explicit dynamics", "the solver of this version: central differences in time, inertia kept");
+    plan.linear = plan.quasistatic && !plan.rotates && !slides && travel.together;
+    const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
+        : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
+    if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
+    else choose("solver", "explicit dynamics", why);
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
     choose("shape function", scene.solver.shape_function == ShapeFunction::linear ? "linear" : "GIMP",
@@ -135,19 +193,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
                 "two fields at nodes whose support a crack cuts, one elsewhere");
     if (!scene.cracks.empty())
-        choose("J, K", plan.grows ? "every second step at each growing tip" : "at saved instants", "domain form, 4 cells around the tip");
+        choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "every second step at each growing tip", "domain form, 4 cells around the tip");
     plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
     choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
+    if (plan.quasistatic) return plan;
 
     const double highest = highest_frequency_squared(body);
     plan.added_frequency_squared = plan.contact || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
-    double slowest = std::numeric_limits<double>::infinity();
-    for (int p = 0; p < body.points.count(); ++p)
-        slowest = std::min(slowest, std::sqrt(body.points.stiffest(p) / body.points.density(p)));
-    plan.slowness = plan.end_time * slowest / scene.specimen.size.maxCoeff();
     return plan;
 }
 
@@ -158,6 +213,11 @@ std::string describe(const Scene& scene, const Plan& plan, const Discretisation&
     text += fmt::format("{:<15} {} x {} cells of {:.4g} x {:.4g} mm, {} points, {} nodes\n", "grid", body.layout.cells_x,
                         body.layout.cells_y, body.layout.cell.x() * 1e3, body.layout.cell.y() * 1e3, body.points.count(),
                         body.layout.nodes());
+    if (plan.quasistatic) {
+        const double seconds = body.layout.nodes() * seconds_per_node * std::sqrt(static_cast<double>(body.layout.nodes()));
+        text += fmt::format("{:<15} about {:.2g} s on one core for an equilibrium\n", "cost", seconds);
+        return text;
+    }
     text += fmt::format("{:<15} {:.4g} us\n", "time step", plan.time_step * 1e6);
     if (std::isfinite(plan.end_time)) {
         const double steps = std::ceil(plan.end_time / plan.time_step);

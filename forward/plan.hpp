@@ -9,6 +9,10 @@ namespace crampfit {
 
 /// What this scene needs, decided once. Nothing that it leaves out is allocated or looped over.
 struct Plan {
+    bool quasistatic = false;   // equilibrium; else explicit dynamics
+    bool linear = false;        // equilibrium goes linearly with the load
+    bool driven = false;        // some edge or body moves
+    double still_from = 0;      // when everything that moves has come to its end [s]; infinite: never
     bool rotates = false;       // finite rotation; else small strain
     bool grows = false;         // some tip may grow
     bool contact = false;       // some body can touch and slide

@@ -5,18 +5,34 @@
 
 namespace crampfit {
 
-Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& body, const ExplicitSolver& solver)
-    : scene_(scene), plan_(plan), body_(body), solver_(solver) {
-    displacement_.driver = driver_named(scene.measure.displacement);
-    displacement_.direction = direction_of(displacement_.driver);
-    force_.driver = driver_named(scene.measure.force);
-    force_.direction = direction_of(force_.driver);
-    if (force_.direction.isZero()) force_.direction = -displacement_.direction;  // a fixed support feels the opposite of the load
+Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement) {
+    Frame frame;
+    const Points& points = body.points;
+    for (int p = 0; p < points.count(); ++p) {
+        const PointState state = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates);
+        const double xx = state.stress(0, 0);
+        const double yy = state.stress(1, 1);
+        const double zz = scene.model.plane == PlaneCondition::strain ? points.poisson_ratio[p] * (xx + yy) : 0.0;
+        frame.moved.push_back(value_at(body, p, displacement).cast<float>());
+        frame.stress.push_back(Eigen::Vector4d(xx, yy, 0.5 * (state.stress(0, 1) + state.stress(1, 0)), zz).cast<float>());
+    }
+    return frame;
+}
 
-    for (std::size_t k = 0; k < scene.cracks.size() && crack_ < 0; ++k)
-        if (scene.cracks[k].grows != Growth::none) crack_ = static_cast<int>(k);
-    if (crack_ < 0 && !scene.cracks.empty()) crack_ = 0;
-    at_end_ = crack_ < 0 || scene.cracks[crack_].grows != Growth::start;
+TrackedTip tracked_tip(const Scene& scene) {
+    TrackedTip tracked;
+    for (std::size_t k = 0; k < scene.cracks.size() && tracked.crack < 0; ++k)
+        if (scene.cracks[k].grows != Growth::none) tracked.crack = static_cast<int>(k);
+    if (tracked.crack < 0 && !scene.cracks.empty()) tracked.crack = 0;
+    tracked.at_end = tracked.crack < 0 || scene.cracks[tracked.crack].grows != Growth::start;
+    return tracked;
+}
+
+Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& body, const ExplicitSolver& solver)
+    : scene_(scene), plan_(plan), body_(body), solver_(solver), gauges_(scene) {
+    const TrackedTip tracked = tracked_tip(scene);
+    crack_ = tracked.crack;
+    at_end_ = tracked.at_end;
     record_.tracked_crack = std::max(crack_, 0);
 
     evenly_ = std::isfinite(plan.end_time);
@@ -33,28 +49,6 @@ Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& b
     }
 }
 
-int Recorder::driver_named(const std::string& name) const {
-    for (std::size_t e = 0; e < scene_.edges.size(); ++e)
-        if (scene_.edges[e].name == name) return static_cast<int>(e);
-    for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
-        if (scene_.bodies[b].name == name) return static_cast<int>(scene_.edges.size() + b);
-    return 0;
-}
-
-Vec2 Recorder::direction_of(int driver) const {
-    const int edges = static_cast<int>(scene_.edges.size());
-    Vec2 drive = Vec2::Zero();
-    if (driver >= edges) {
-        if (driver - edges < static_cast<int>(scene_.bodies.size())) drive = scene_.bodies[driver - edges].velocity;
-    } else if (scene_.edges[driver].traction) {
-        drive = *scene_.edges[driver].traction;
-    } else {
-        const auto& velocity = scene_.edges[driver].velocity;
-        drive = {velocity[0].value_or(0.0), velocity[1].value_or(0.0)};
-    }
-    return drive.isZero() ? drive : drive.normalized();
-}
-
 void Recorder::add_step() {
     ++steps_;
     ++reaction_count_;
@@ -64,7 +58,7 @@ void Recorder::add_step() {
 Instant Recorder::now() const {
     Instant now = record_.series.empty() ? Instant{} : record_.series.back();
     now.time = solver_.time();
-    if (!reaction_sum_.empty()) now.displacement = solver_.moved(displacement_.driver).dot(displacement_.direction);
+    if (!reaction_sum_.empty()) now.displacement = solver_.moved(gauges_.displacement).dot(gauges_.displacement_direction);
     if (crack_ >= 0) {
         now.crack_length = solver_.cracks().lines[crack_].length;
         now.tip = solver_.cracks().lines[crack_].tip(at_end_).position;
@@ -104,7 +98,7 @@ void Recorder::save_row() {
         reaction_sum_[d].setZero();
     }
     reaction_count_ = 0;
-    if (!record_.reactions.empty()) row.force = record_.reactions[force_.driver].force.back().dot(force_.direction);
+    if (!record_.reactions.empty()) row.force = record_.reactions[gauges_.force].force.back().dot(gauges_.force_direction);
 
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k) {
         const bool end = k == crack_ ? at_end_ : scene_.cracks[k].grows != Growth::start;
@@ -156,21 +150,11 @@ void Recorder::thin_out() {
 
 void Recorder::save_frame() {
     ++frames_saved_;
-    Frame frame;
+    record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements()));
+    Frame& frame = record_.frames.back();
     frame.time = solver_.time();
     frame.displacement = now().displacement;
-    const Points& points = body_.points;
-    for (int p = 0; p < points.count(); ++p) {
-        const Mat2 gradient = gradient_at(body_, p, solver_.displacements());
-        const PointState state = elastic_state(gradient, points.stiffness_of(p), plan_.rotates);
-        const double xx = state.stress(0, 0);
-        const double yy = state.stress(1, 1);
-        const double zz = scene_.model.plane == PlaneCondition::strain ? points.poisson_ratio[p] * (xx + yy) : 0.0;
-        frame.moved.push_back(value_at(body_, p, solver_.displacements()).cast<float>());
-        frame.stress.push_back(Eigen::Vector4d(xx, yy, 0.5 * (state.stress(0, 1) + state.stress(1, 0)), zz).cast<float>());
-    }
     if (crack_ >= 0) frame.crack = solver_.cracks().lines[crack_].points;
-    record_.frames.push_back(std::move(frame));
 }
 
 void Recorder::finish(RunStatus status, std::string message) {

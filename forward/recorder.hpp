@@ -5,6 +5,16 @@
 
 namespace crampfit {
 
+/// The points with this displacement; when that is and the crack are the caller's.
+Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement);
+
+/// The tip whose length, place, G and K the series holds: of the first crack that grows, or of the first.
+struct TrackedTip {
+    int crack = -1;      // -1: no crack
+    bool at_end = true;
+};
+TrackedTip tracked_tip(const Scene& scene);
+
 /// Watches a run and keeps what the scene asks for: rows of the series at even intervals, frames at even progress.
 class Recorder {
   public:
@@ -29,13 +39,6 @@ class Recorder {
     Record take() { return std::move(record_); }
 
   private:
-    struct Gauge {     // an edge or body that is measured, and along which direction
-        int driver;
-        Vec2 direction;
-    };
-
-    int driver_named(const std::string& name) const;
-    Vec2 direction_of(int driver) const;
     void save_row();
     void save_frame();
     void thin_out();
@@ -44,8 +47,7 @@ class Recorder {
     const Plan& plan_;
     const Discretisation& body_;
     const ExplicitSolver& solver_;
-    Gauge force_;
-    Gauge displacement_;
+    Gauges gauges_;
     int crack_ = -1;        // the one in the series; -1: none
     bool at_end_ = true;
 

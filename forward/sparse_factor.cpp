@@ -2,6 +2,7 @@
 
 #include <cblas.h>
 #include <cholmod.h>
+#include <omp.h>
 
 #include <functional>
 
@@ -75,6 +76,7 @@ bool SparseFactor::factor(const Eigen::SparseMatrix<double>& lower, bool new_pat
     view.dtype = CHOLMOD_DOUBLE;
     view.sorted = view.packed = 1;
     Parts& parts = *parts_;
+    omp_set_max_active_levels(0);  // of this thread; CHOLMOD asks for four threads whatever the user says
     if (new_pattern || !parts.factor) {
         cholmod_free_factor(&parts.factor, &parts.common);
         parts.factor = cholmod_analyze(&view, &parts.common);

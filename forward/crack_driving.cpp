@@ -1,0 +1,156 @@
+#include "forward/crack_driving.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crampfit {
+
+namespace {
+
+constexpr double never = std::numeric_limits<double>::infinity();
+
+// Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
+LoadState weighted(const std::vector<const LoadState*>& states, const std::vector<double>& weights) {
+    LoadState sum;
+    sum.reactions.assign(states[0]->reactions.size(), Vec2::Zero());
+    sum.tips.resize(states[0]->tips.size());
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        const LoadState& s = *states[i];
+        const double w = weights[i];
+        sum.time += w * s.time;
+        sum.potential += w * s.potential;
+        sum.power += w * s.power;
+        sum.traction_work += w * s.traction_work;
+        sum.displacement += w * s.displacement;
+        for (std::size_t d = 0; d < sum.reactions.size(); ++d) sum.reactions[d] += w * s.reactions[d];
+        for (std::size_t k = 0; k < sum.tips.size(); ++k) {
+            sum.tips[k].G += w * s.tips[k].G;
+            sum.tips[k].K_I += w * s.tips[k].K_I;
+            sum.tips[k].K_II += w * s.tips[k].K_II;
+            sum.tips[k].opening += w * s.tips[k].opening;
+            sum.tips[k].toughness += w * s.tips[k].toughness;
+        }
+    }
+    return sum;
+}
+
+// Least root at or after 0 of c0 + c1 t + c2 t^2 that has the value rising through 0; infinite: none.
+double first_rise(double c0, double c1, double c2) {
+    if (c0 >= 0.0) return 0.0;
+    if (c2 == 0.0) return c1 > 0.0 ? -c0 / c1 : never;
+    const double discriminant = c1 * c1 - 4.0 * c2 * c0;
+    if (discriminant < 0.0) return never;
+    const double root = std::sqrt(discriminant);
+    const double t = c1 >= 0.0 ? -2.0 * c0 / (c1 + root) : (-c1 + root) / (2.0 * c2);
+    return t >= 0.0 ? t : never;
+}
+
+// Value at a fraction of an interval of the cubic with these end values and slopes (times the interval).
+double cubic(double from, double slope_from, double to, double slope_to, double s) {
+    const double r = 1.0 - s;
+    return from * (1.0 + 2.0 * s) * r * r + slope_from * s * r * r + to * s * s * (3.0 - 2.0 * s) - slope_to * s * s * r;
+}
+
+} // namespace
+
+double Station::route_length() const {
+    double length = 0.0;
+    for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();
+    return length;
+}
+
+double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& route) {
+    constexpr int samples = 16;  // of each leg: a sharp boundary is seen to 1/32 of it
+    if (route.size() == 1) return materials.at(route[0]).toughness;
+    double sum = 0.0;
+    double length = 0.0;
+    for (std::size_t k = 0; k + 1 < route.size(); ++k) {
+        const double leg = (route[k + 1] - route[k]).norm();
+        for (int i = 0; i < samples; ++i)
+            sum += leg / samples * materials.at(route[k] + (i + 0.5) / samples * (route[k + 1] - route[k])).toughness;
+        length += leg;
+    }
+    return sum / length;
+}
+
+LoadState CrackDriving::at(const Station& station, double time) const {
+    const std::vector<LoadState>& states = station.states;
+    const double t = std::min(time, still_from);
+    LoadState found;
+    if (states.size() == 1) {
+        found = states[0];
+    } else if (linear) {
+        std::vector<const LoadState*> nodes;
+        std::vector<double> weights;
+        for (std::size_t i = 0; i < states.size(); ++i) {  // Lagrange's polynomial
+            double w = 1.0;
+            for (std::size_t j = 0; j < states.size(); ++j)
+                if (j != i) w *= (t - states[j].time) / (states[i].time - states[j].time);
+            nodes.push_back(&states[i]);
+            weights.push_back(w);
+        }
+        found = weighted(nodes, weights);
+    } else {
+        std::size_t i = 1;
+        while (i + 1 < states.size() && states[i].time < t) ++i;
+        const LoadState& from = states[i - 1];
+        const LoadState& to = states[i];
+        const double span = to.time - from.time;
+        const double s = (t - from.time) / span;
+        found = weighted({&from, &to}, {1.0 - s, s});
+        found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
+    }
+    found.time = time;
+    if (time > still_from) found.power = 0.0;
+    return found;
+}
+
+double CrackDriving::critical_time(const Station& station, double toughness) const {
+    if (station.crack < 0 || station.states.empty()) return never;
+    const std::vector<LoadState>& states = station.states;
+    const std::size_t tip = 2 * station.crack + station.at_end;
+    const bool finite_advance = !station.ahead.empty();
+    const double needed = finite_advance ? toughness * station.route_length() * station.thickness : toughness;
+    // What is left over at each state [J, or J/m^2 for advance 0], and its slope.
+    std::vector<double> excess, slope;
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        excess.push_back((finite_advance ? states[i].potential - station.ahead[i][0] : states[i].tips[tip].G) - needed);
+        slope.push_back(finite_advance ? states[i].power - station.ahead[i][1] : 0.0);
+    }
+    if (states.size() == 1) return excess[0] >= 0.0 ? states[0].time : never;
+    double found = never;
+    if (linear) {  // times 0, T/2, T
+        const double T = states[2].time;
+        const double c2 = 2.0 * (excess[0] - 2.0 * excess[1] + excess[2]) / (T * T);
+        const double c1 = (excess[2] - excess[0]) / T - c2 * T;
+        found = first_rise(excess[0], c1, c2);
+    } else {
+        std::size_t i = 1;
+        while (i + 1 < states.size() && excess[i] < 0.0) ++i;
+        const double span = states[i].time - states[i - 1].time;
+        if (excess[i] < 0.0) return never;  // not within what is known
+        if (excess[i - 1] >= 0.0) {
+            if (states[i - 1].time == 0.0) return 0.0;
+            // Below what is known: the energy released goes as a power of the time there.
+            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(states[i].time / states[i - 1].time);
+            return states[i - 1].time * std::pow(needed / (excess[i - 1] + needed), 1.0 / std::max(power, 0.5));
+        }
+        double low = 0.0, high = 1.0;
+        for (int k = 0; k < 60; ++k) {
+            const double s = 0.5 * (low + high);
+            double value = std::lerp(excess[i - 1], excess[i], s);
+            if (finite_advance) {
+                value = cubic(excess[i - 1], span * slope[i - 1], excess[i], span * slope[i], s);
+            } else if (states[i - 1].time > 0.0) {  // G by its roots, which go nearly linearly with the load
+                const double root = std::lerp(std::sqrt(std::max(0.0, excess[i - 1] + needed)), std::sqrt(excess[i] + needed), s);
+                value = root * root - needed;
+            }
+            (value < 0.0 ? low : high) = s;
+        }
+        found = states[i - 1].time + high * span;
+    }
+    return found <= still_from * (1.0 + 1e-12) ? found : never;
+}
+
+} // namespace crampfit
