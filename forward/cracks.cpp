@@ -181,13 +181,16 @@ int CrackFields::field(int node, unsigned mask, int crack) {
 
 void CrackFields::add_pairs(int node, unsigned mask) {
     const Vec2 x = body_->layout.node_position(node);
-    const double plane_modulus = materials_->average(x, 0.5 * body_->layout.cell).plane_modulus();
     const int own = field_of_.at({node, mask});
     for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
         const unsigned other_mask = mask ^ (1u << k);
         const auto known = field_of_.find({node, other_mask});
         if (other_mask != 0 && known == field_of_.end()) continue;
         const int other = other_mask == 0 ? node : known->second;
+        // The wood that counts is where the tip is, on the way, when it frees the pair.
+        const bool at_end = (x - lines[k].end.position).squaredNorm() <= (x - lines[k].start.position).squaredNorm();
+        const Vec2 on_the_way = x + (0.5 - tip_shift) * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
+        const double plane_modulus = materials_->average(on_the_way, 0.5 * body_->layout.cell).plane_modulus();
         const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
         pairs.push_back({own_is_left ? own : other, own_is_left ? other : own, node, k,
                          left_of(lines[k].direction_near(true, x)), plane_modulus, 0.0});

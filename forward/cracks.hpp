@@ -38,7 +38,7 @@ struct FieldPair {
     int node;         // where they are
     int crack;
     Vec2 normal;      // unit, from right to left
-    double plane_modulus;  // E' of the wood there [Pa]
+    double plane_modulus;  // E' of the wood where the tip frees it [Pa]
     double tie;       // stiffness that still holds the pair together [N/m]; 0 once the crack has cut the node's whole support
 };
 
