@@ -54,6 +54,23 @@ double cubic(double from, double slope_from, double to, double slope_to, double 
 
 } // namespace
 
+LoadState scaled(const LoadState& state, double factor) {
+    LoadState at = state;
+    at.time *= factor;
+    at.potential *= factor * factor;
+    at.power *= factor;
+    at.traction_work *= factor;
+    at.displacement *= factor;
+    for (Vec2& r : at.reactions) r *= factor;
+    for (TipLoad& tip : at.tips) {
+        tip.G *= factor * factor;
+        tip.K_I *= factor;
+        tip.K_II *= factor;
+        tip.opening *= factor;
+    }
+    return at;
+}
+
 double Station::route_length() const {
     double length = 0.0;
     for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();

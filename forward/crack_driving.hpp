@@ -18,6 +18,9 @@ struct LoadState {
     std::vector<TipLoad> tips;      // two a crack: start, end
 };
 
+/// The same equilibrium at another load, where everything goes linearly with the load from none on.
+LoadState scaled(const LoadState& state, double factor);
+
 /// A crack length and what is known of it: equilibria at several times, and how much energy the next `advance` would release.
 struct Station {
     std::vector<std::array<Vec2, 2>> tips;  // [cracks] start, end [m]

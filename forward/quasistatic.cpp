@@ -87,31 +87,29 @@ LoadState Quasistatic::load_state() const {
     return state;
 }
 
-// In a linear scene no load and full load say all; the state half way is their mean.
+// In a linear scene no load and full load say all; the state half way is between them.
 bool Quasistatic::know_linear(Live& live) {
-    const std::size_t fields = equilibrium_.displacements().size();
     const auto solve = [&](double time) {
         ++equilibria_;
         return equilibrium_.solve(time) == Equilibrium::Outcome::solved;
     };
-    bool good = true;
-    std::vector<Vec2> unloaded(fields, Vec2::Zero());
-    if (!equilibrium_.boundary().tractions.empty()) {
-        good = solve(0.0);
-        unloaded = equilibrium_.displacements();
+    if (equilibrium_.boundary().tractions.empty()) {  // all goes with the load or its square
+        if (!solve(time_of(2))) return false;
+        live.states[2] = load_state();
+        for (const int number : {0, 1}) live.states[number] = scaled(live.states[2], 0.5 * number);
+        return true;
     }
-    std::vector<Vec2> loaded = unloaded;
-    if (plan_.driven) {
-        good = good && solve(time_of(2));
-        loaded = equilibrium_.displacements();
-    }
+    if (!solve(0.0)) return false;
+    const std::vector<Vec2> unloaded = equilibrium_.displacements();
+    if (plan_.driven && !solve(time_of(2))) return false;
+    const std::vector<Vec2> loaded = equilibrium_.displacements();
     for (int number = 0; number <= 2; ++number) {
-        std::vector<Vec2> u(fields);
-        for (std::size_t f = 0; f < fields; ++f) u[f] = (1.0 - 0.5 * number) * unloaded[f] + 0.5 * number * loaded[f];
+        std::vector<Vec2> u(unloaded.size());
+        for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * number) * unloaded[f] + 0.5 * number * loaded[f];
         equilibrium_.set_displacements(u, time_of(number));
         live.states[number] = load_state();
     }
-    return good;
+    return true;
 }
 
 // A specimen in pieces that nothing holds together carries nothing.
