@@ -36,6 +36,14 @@ const std::array<SeriesColumn, 13> series_columns{{
      [](Instant& i) -> double& { return i.external_work; }},
 }};
 
+const std::array<DrivingColumn, 5> driving_columns{{
+    {"crack_length", "m", "crack_length_m", "length of the crack", &CriticalLoad::crack_length},
+    {"displacement", "m", "displacement_m", "of the measured edge or body when it moves on", &CriticalLoad::displacement},
+    {"force", "N", "force_N", "reaction at the load cell when it moves on", &CriticalLoad::force},
+    {"G", "J/m^2", "G_J_m2", "energy release rate at the tip when it moves on", &CriticalLoad::G},
+    {"toughness", "J/m^2", "toughness_J_m2", "mean toughness over the next advance", &CriticalLoad::toughness},
+}};
+
 std::size_t crack_number(const Record& record, std::size_t further) {
     return further < static_cast<std::size_t>(record.tracked_crack) ? further : further + 1;
 }
@@ -139,6 +147,36 @@ void read_reactions(const Group& root, Record& record) {
     }
 }
 
+// ---- crack driving
+
+void write_driving(Group& root, const std::vector<CriticalLoad>& driving) {
+    Group group = root.make_group("driving", "the load at which the crack moves on from each place of its way; the table `driving`");
+    std::vector<Vec2> tips;
+    for (const CriticalLoad& row : driving)
+        tips.push_back(row.tip);
+    write_component(group, "tip_x", tips, 0, {"m", "tip in the undeformed specimen"});
+    write_component(group, "tip_y", tips, 1, {"m", "tip in the undeformed specimen"});
+    for (const DrivingColumn& column : driving_columns) {
+        std::vector<double> values;
+        for (const CriticalLoad& row : driving)
+            values.push_back(row.*column.value);
+        group.write(column.name, values, {column.units, column.description});
+    }
+}
+
+std::vector<CriticalLoad> read_driving(const Group& group) {
+    std::vector<CriticalLoad> driving(group.read_column<double>("tip_x").size());
+    const std::vector<Vec2> tips = read_components(group, "tip", driving.size());
+    for (std::size_t i = 0; i < driving.size(); ++i)
+        driving[i].tip = tips[i];
+    for (const DrivingColumn& column : driving_columns) {
+        const std::vector<double> values = group.read_column<double>(column.name, driving.size());
+        for (std::size_t i = 0; i < driving.size(); ++i)
+            driving[i].*column.value = values[i];
+    }
+    return driving;
+}
+
 // ---- points and frames
 
 void write_points(Group& root, const Record& record) {
@@ -196,6 +234,7 @@ Record read_all_but_frames(const Group& root) {
     read_cracks(root, record);
     record.tracked_crack = read_tracked_crack(root, record);
     read_reactions(root, record);
+    record.driving = read_driving(root.group("driving"));
     record.point_position = root.group("points").read_rows<double, 2>("position");
     record.point_latewood = root.group("points").read_column<float>("latewood", record.point_position.size());
     record.scene_text = root.read_text("scene_text");
@@ -225,6 +264,7 @@ void write(const Record& record, const std::filesystem::path& file) {
         write_series(root, record.series);
         write_cracks(root, record);
         write_reactions(root, record.reactions);
+        write_driving(root, record.driving);
         write_points(root, record);
     });
 }

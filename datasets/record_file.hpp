@@ -19,6 +19,17 @@ struct SeriesColumn {
 /// Columns of the table `series`, in its order.
 extern const std::array<SeriesColumn, 13> series_columns;
 
+/// A column of the crack-driving curve but the tip, in a file and in a table.
+struct DrivingColumn {
+    const char* name;
+    const char* units;
+    const char* header;
+    const char* description;
+    double CriticalLoad::*value;
+};
+
+extern const std::array<DrivingColumn, 5> driving_columns;
+
 /// The number of the crack whose history is `Record::cracks[further]`, as an index into `Record::paths`.
 std::size_t crack_number(const Record& record, std::size_t further);
 

@@ -120,7 +120,7 @@ std::map<std::string, IsotropicMaterial> read_materials(const Entry& materials) 
 }
 
 SolverChoice read_solver(const Entry& entry) {
-    entry.only({"kind", "shape_function", "damping"});
+    entry.only({"kind", "shape_function", "damping", "extrapolate"});
     SolverChoice solver;
     if (const auto kind = entry.find("kind")) {
         solver.kind = kind->choice<SolverKind>({{"auto", SolverKind::automatic},
@@ -133,6 +133,9 @@ SolverChoice read_solver(const Entry& entry) {
                                                               {"gimp", ShapeFunction::gimp},
                                                               {"bspline2", ShapeFunction::bspline2},
                                                               {"cpdi", ShapeFunction::cpdi}});
+    }
+    if (const auto extrapolate = entry.find("extrapolate")) {
+        solver.extrapolate = extrapolate->boolean();
     }
     if (const auto damping = entry.find("damping")) {
         solver.damping = damping->number(limits::damping);

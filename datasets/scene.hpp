@@ -135,6 +135,7 @@ enum class ShapeFunction { automatic, linear, gimp, bspline2, cpdi };
 struct SolverChoice {
     SolverKind kind = SolverKind::automatic;
     ShapeFunction shape_function = ShapeFunction::automatic;
+    bool extrapolate = true;  // equilibrium: a second grid, twice as coarse, takes off most of the grid's error
     double damping = 0.0;   // mass-proportional, force = -damping * mass * velocity [1/s]
 };
 

@@ -98,6 +98,18 @@ Table reactions_table(const Record& record) {
     return table;
 }
 
+Table driving_table(const Record& record) {
+    Table table{{"tip_x_m", "tip_y_m"}};
+    for (const DrivingColumn& column : driving_columns)
+        table.front().push_back(column.header);
+    for (const CriticalLoad& load : record.driving) {
+        Row& row = table.emplace_back(Row{text_of(load.tip.x()), text_of(load.tip.y())});
+        for (const DrivingColumn& column : driving_columns)
+            row.push_back(text_of(load.*column.value));
+    }
+    return table;
+}
+
 std::vector<Offer> offers(const Record& record) {
     std::vector<Offer> offers{{"series", [&] { return series_table(record); }}};
     // A specimen without a crack has no path.
@@ -109,6 +121,7 @@ std::vector<Offer> offers(const Record& record) {
         offers.push_back({fmt::format("path{}", i + 1),
                           [&record, i] { return path_table(record.paths.at(crack_number(record, i))); }});
     }
+    offers.push_back({"driving", [&] { return driving_table(record); }});
     offers.push_back({"reactions", [&] { return reactions_table(record); }});
     return offers;
 }

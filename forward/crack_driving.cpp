@@ -8,6 +8,9 @@ namespace crampfit {
 
 namespace {
 
+// How far beyond the last known load a critical load may be told, in steps of the loading.
+constexpr double most_beyond = 1.0;
+
 constexpr double never = std::numeric_limits<double>::infinity();
 
 // Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
@@ -91,6 +94,28 @@ double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& rou
     return sum / length;
 }
 
+CrackDriving extrapolated(const CrackDriving& fine, const CrackDriving& coarse) {
+    constexpr double order = 2.0;
+    const double share = 1.0 / (std::pow(2.0, order) - 1.0);
+    const auto improve = [&](auto& value, const auto& other) { value += share * (value - other); };
+    CrackDriving result = fine;
+    for (std::size_t i = 0; i < result.stations.size(); ++i) {
+        Station& station = result.stations[i];
+        const Station& other = coarse.stations[i];
+        for (std::size_t k = 0; k < station.states.size(); ++k) {
+            LoadState& state = station.states[k];
+            improve(state.potential, other.states[k].potential);
+            improve(state.power, other.states[k].power);
+            improve(state.traction_work, other.states[k].traction_work);
+            improve(state.displacement, other.states[k].displacement);
+            for (std::size_t d = 0; d < state.reactions.size(); ++d) improve(state.reactions[d], other.states[k].reactions[d]);
+        }
+        for (std::size_t k = 0; k < station.ahead.size(); ++k)
+            for (int what = 0; what < 2; ++what) improve(station.ahead[k][what], other.ahead[k][what]);
+    }
+    return result;
+}
+
 LoadState CrackDriving::at(const Station& station, double time) const {
     const std::vector<LoadState>& states = station.states;
     const double t = std::min(time, still_from);
@@ -146,7 +171,12 @@ double CrackDriving::critical_time(const Station& station, double toughness) con
         std::size_t i = 1;
         while (i + 1 < states.size() && excess[i] < 0.0) ++i;
         const double span = states[i].time - states[i - 1].time;
-        if (excess[i] < 0.0) return never;  // not within what is known
+        if (excess[i] < 0.0) {  // beyond what is known by a little
+            if (excess[i - 1] + needed <= 0.0 || states[i - 1].time == 0.0) return never;
+            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(states[i].time / states[i - 1].time);
+            const double time = states[i].time * std::pow(needed / (excess[i] + needed), 1.0 / std::max(power, 0.5));
+            return time < states[i].time + most_beyond * span ? time : never;
+        }
         if (excess[i - 1] >= 0.0) {
             if (states[i - 1].time == 0.0) return 0.0;
             // Below what is known: the energy released goes as a power of the time there.

@@ -50,6 +50,10 @@ struct CrackDriving {
     double critical_time(const Station& station, double toughness) const;
 };
 
+/// What two walks over the same stations, on a grid and on one with cells twice as wide, tell of one with cells of no width: errors go
+/// with the square of the cell, so that a third of the difference is left (Richardson 1911). G and K at the tips stay as they are.
+CrackDriving extrapolated(const CrackDriving& fine, const CrackDriving& coarse);
+
 /// Mean toughness of the wood along a route; of one place, at it [J/m^2].
 double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& route);
 

@@ -20,6 +20,9 @@ constexpr double most_rotation = 0.06;
 // Loading that takes this many transits of a wave is taken for equilibrium: inertia then adds its inverse square to the energy.
 constexpr double slow_loading = 100.0;
 
+// A grid with fewer cells on its shorter side says nothing about a finer one's error.
+constexpr int least_coarse_cells = 16;
+
 // Where no stop condition says how far the load goes: about the strain at which earlywood cracks.
 constexpr double cracking_strain = 0.02;
 
@@ -178,6 +181,13 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
+    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate &&
+                        std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells;
+    if (plan.quasistatic)
+        choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
+               plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
+               : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side", least_coarse_cells)
+                                          : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
     choose("shape function", scene.solver.shape_function == ShapeFunction::linear ? "linear" : "GIMP",

@@ -11,6 +11,7 @@ namespace crampfit {
 struct Plan {
     bool quasistatic = false;   // equilibrium; else explicit dynamics
     bool linear = false;        // equilibrium goes linearly with the load
+    bool extrapolates = false;  // a second grid, twice as coarse, tells and takes off most of the grid's error
     bool driven = false;        // some edge or body moves
     double still_from = 0;      // when everything that moves has come to its end [s]; infinite: never
     bool rotates = false;       // finite rotation; else small strain

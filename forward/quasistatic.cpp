@@ -25,8 +25,9 @@ constexpr int most_parts = 16;
 
 } // namespace
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
-    : scene_(scene), plan_(plan), materials_(materials), body_(body), equilibrium_(scene, plan, materials, body) {
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
+                         const CrackDriving* leader)
+    : scene_(scene), plan_(plan), materials_(materials), body_(body), leader_(leader), equilibrium_(scene, plan, materials, body) {
     driving_.linear = plan.linear;
     driving_.still_from = plan.still_from;
     const double end = std::min(plan.end_time, plan.still_from);
@@ -41,6 +42,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
         ahead_ = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         increment_ = crack.advance / static_cast<double>(ahead_);
     }
+    if (leader && !leader->stations.front().route.empty()) ahead_ = leader->stations.front().route.size() - 1;
     add_live();
 }
 
@@ -156,6 +158,18 @@ bool Quasistatic::know(Live& live, int number) {
     return true;
 }
 
+Vec2 Quasistatic::next_tip(const Live& last, const TipLoad& load) const {
+    const Station& station = last.station;
+    if (leader_) {
+        const std::size_t number = driving_.stations.size() + live_.size();
+        const auto& stations = leader_->stations;
+        if (number < stations.size()) return stations[number].tips[station.crack][station.at_end];
+        return stations.back().route[number - stations.size() + 1];  // the advance from the last station
+    }
+    const CrackTip& tip = equilibrium_.cracks().lines[station.crack].tip(station.at_end);
+    return tip.position + increment_ * growth_direction(scene_.cracks[station.crack].direction, tip, load);
+}
+
 // Grows the crack from the last place to the next one.
 bool Quasistatic::extend() {
     Live& last = live_.back();
@@ -172,9 +186,8 @@ bool Quasistatic::extend() {
         load = &last.states.at(known);
         equilibrium_.set_displacements(last.displacement.at(known), load->time);
     }
-    const CrackTip tip = equilibrium_.cracks().lines[station.crack].tip(station.at_end);
-    const Vec2 direction = growth_direction(scene_.cracks[station.crack].direction, tip, load->tips[2 * station.crack + station.at_end]);
-    const auto fields = equilibrium_.grow(station.crack, station.at_end, tip.position + increment_ * direction);
+    const Vec2 to = next_tip(last, load->tips[2 * station.crack + station.at_end]);
+    const auto fields = equilibrium_.grow(station.crack, station.at_end, to);
     std::map<int, std::vector<Vec2>> guess;
     for (auto& [number, displacement] : last.displacement) {
         guess[number] = displacement;
@@ -219,15 +232,35 @@ void Quasistatic::choose_tip(Station& station) const {
     }
 }
 
+void Quasistatic::find_route(Station& station) const {
+    if (station.crack < 0) return;
+    station.route = {station.tips[station.crack][station.at_end]};
+    for (std::size_t k = 1; k < live_.size() && ahead_ > 0; ++k) {
+        const Vec2& tip = live_[k].station.tips[station.crack][station.at_end];
+        if (tip != station.route.back()) station.route.push_back(tip);
+    }
+}
+
+// Finds the equilibria that the leader has.
+bool Quasistatic::follow(Live& live, Live& ahead) {
+    const Station& example = leader_->stations[driving_.stations.size()];
+    live.station.crack = example.crack;
+    live.station.at_end = example.at_end;
+    find_route(live.station);
+    if (!plan_.linear) {
+        for (const LoadState& state : example.states) {
+            const int number = static_cast<int>(std::lround(state.time / time_step_));
+            if (!know(live, number) || (&live != &ahead && !know(ahead, number))) return false;
+        }
+    }
+    return take_ahead(live, ahead) && live.station.states.size() == example.states.size();
+}
+
 // Finds enough equilibria of a place to know when the crack moves on from it.
 bool Quasistatic::finish(Live& live, Live& ahead) {
+    if (leader_) return follow(live, ahead);
     Station& station = live.station;
-    if (station.crack >= 0) {
-        station.route = {station.tips[station.crack][station.at_end]};
-        for (std::size_t k = 1; k < live_.size() && ahead_ > 0; ++k)
-            if (live_[k].station.tips[station.crack][station.at_end] != station.route.back())
-                station.route.push_back(live_[k].station.tips[station.crack][station.at_end]);
-    }
+    find_route(station);
     const auto judge = [&] {
         if (!take_ahead(live, ahead)) return std::numeric_limits<double>::infinity();
         if (growing_.size() > 1) choose_tip(station);
@@ -258,6 +291,7 @@ bool Quasistatic::step() {
     if (finished_ || !failure_.empty()) return false;
     if (plan_.linear && live_.size() == 1 && live_.front().states.empty() && !know_linear(live_.front()))
         throw InputError(scene_.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+    if (leader_ && driving_.stations.size() == leader_->stations.size()) return false;
     while (live_.size() <= ahead_ && !live_.back().left)
         if (!extend()) {
             failure_ = "no equilibrium was found";

@@ -15,7 +15,9 @@ namespace crampfit {
 /// waits for it (crack-length control; what rising displacement makes of it is `trace`'s business).
 class Quasistatic {
   public:
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
+    /// With a `leader`, another walk in the same scene on another grid, takes the same way and knows the same times.
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
+                const CrackDriving* leader = nullptr);
 
     /// Adds the next station, with what is needed to know when the crack moves on from it. False: the walk is over.
     bool step();
@@ -24,6 +26,7 @@ class Quasistatic {
     double time() const { return time_; }
     double crack_length() const;
     const CrackDriving& driving() const { return driving_; }
+    CrackDriving take_driving() { return std::move(driving_); }
     bool finished() const { return finished_; }                // nothing can grow any more
     const std::string& failure() const { return failure_; }  // why the walk broke off; empty: it did not
     int equilibria() const { return equilibria_; }
@@ -47,6 +50,9 @@ class Quasistatic {
     LoadState load_state() const;
     bool take_ahead(Live& live, const Live& ahead);
     bool finish(Live& live, Live& ahead);
+    bool follow(Live& live, Live& ahead);
+    Vec2 next_tip(const Live& last, const TipLoad& load) const;
+    void find_route(Station& station) const;
     LoadState nothing(double time) const;
     void choose_tip(Station& station) const;
     double time_of(int number) const { return number * time_step_; }
@@ -55,6 +61,7 @@ class Quasistatic {
     const Plan& plan_;
     const MaterialMap& materials_;
     Discretisation& body_;
+    const CrackDriving* leader_;
     Equilibrium equilibrium_;
     CrackDriving driving_;
     std::deque<Live> live_;         // from the station that is next to be finished on

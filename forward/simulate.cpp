@@ -74,6 +74,18 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
+// The same walk on a grid with cells twice as wide, and what both tell of one with cells of no width.
+CrackDriving improved(const Scene& scene, const Plan& plan, CrackDriving driving) {
+    Scene coarse = scene;
+    coarse.model.cell *= 2.0;
+    const MaterialMap materials(coarse);
+    Discretisation body(coarse, materials);
+    Quasistatic walk(coarse, plan, materials, body, &driving);
+    while (walk.step()) {}
+    if (walk.driving().stations.size() < driving.stations.size()) return driving;
+    return extrapolated(driving, walk.driving());
+}
+
 Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
                        const SimulateOptions& options) {
     Quasistatic walk(scene, plan, materials, body);
@@ -90,10 +102,12 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
             options.progress({std::clamp(std::max(by_time, by_length), 0.0, 1.0), walk.time(), walk.crack_length(), walk.equilibria()});
         }
     }
-    Record record = trace(scene, plan, walk.driving(), materials);
+    CrackDriving driving = walk.take_driving();
+    if (plan.extrapolates && !interrupted) driving = improved(scene, plan, std::move(driving));
+    Record record = trace(scene, plan, driving, materials);
     record.steps = walk.equilibria();
     record.points = body.points.count();
-    if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk.driving(), record);
+    if (scene.output.frames > 0) draw_frames(scene, plan, materials, driving, record);
     if (interrupted) {
         record.status = RunStatus::interrupted;
         record.message = "stopped by the user";
