@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace crampfit {
 
 namespace {
-
-// How far beyond the last known load a critical load may be told, in steps of the loading.
-constexpr double most_beyond = 1.0;
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
@@ -94,50 +92,38 @@ double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& rou
     return sum / length;
 }
 
-CrackDriving extrapolated(const CrackDriving& fine, const CrackDriving& coarse) {
+void extrapolate(LoadState& fine, const LoadState& coarse) {
     constexpr double order = 2.0;
     const double share = 1.0 / (std::pow(2.0, order) - 1.0);
     const auto improve = [&](auto& value, const auto& other) { value += share * (value - other); };
-    CrackDriving result = fine;
-    for (std::size_t i = 0; i < result.stations.size(); ++i) {
-        Station& station = result.stations[i];
-        const Station& other = coarse.stations[i];
-        for (std::size_t k = 0; k < station.states.size(); ++k) {
-            LoadState& state = station.states[k];
-            improve(state.potential, other.states[k].potential);
-            improve(state.power, other.states[k].power);
-            improve(state.traction_work, other.states[k].traction_work);
-            improve(state.displacement, other.states[k].displacement);
-            for (std::size_t d = 0; d < state.reactions.size(); ++d) improve(state.reactions[d], other.states[k].reactions[d]);
-        }
-        for (std::size_t k = 0; k < station.ahead.size(); ++k)
-            for (int what = 0; what < 2; ++what) improve(station.ahead[k][what], other.ahead[k][what]);
-    }
-    return result;
+    improve(fine.potential, coarse.potential);
+    improve(fine.power, coarse.power);
+    improve(fine.traction_work, coarse.traction_work);
+    improve(fine.displacement, coarse.displacement);
+    for (std::size_t d = 0; d < fine.reactions.size(); ++d) improve(fine.reactions[d], coarse.reactions[d]);
 }
 
-LoadState CrackDriving::at(const Station& station, double time) const {
-    const std::vector<LoadState>& states = station.states;
+LoadState Station::at(double time) const {
     const double t = std::min(time, still_from);
     LoadState found;
     if (states.size() == 1) {
-        found = states[0];
+        found = states.begin()->second;
     } else if (linear) {
         std::vector<const LoadState*> nodes;
         std::vector<double> weights;
-        for (std::size_t i = 0; i < states.size(); ++i) {  // Lagrange's polynomial
+        for (const auto& [i, state] : states) {  // Lagrange's polynomial
             double w = 1.0;
-            for (std::size_t j = 0; j < states.size(); ++j)
-                if (j != i) w *= (t - states[j].time) / (states[i].time - states[j].time);
-            nodes.push_back(&states[i]);
+            for (const auto& [j, other] : states)
+                if (j != i) w *= (t - other.time) / (state.time - other.time);
+            nodes.push_back(&state);
             weights.push_back(w);
         }
         found = weighted(nodes, weights);
     } else {
-        std::size_t i = 1;
-        while (i + 1 < states.size() && states[i].time < t) ++i;
-        const LoadState& from = states[i - 1];
-        const LoadState& to = states[i];
+        auto next = std::next(states.begin());
+        while (std::next(next) != states.end() && next->second.time < t) ++next;
+        const LoadState& from = std::prev(next)->second;
+        const LoadState& to = next->second;
         const double span = to.time - from.time;
         const double s = (t - from.time) / span;
         found = weighted({&from, &to}, {1.0 - s, s});
@@ -148,54 +134,49 @@ LoadState CrackDriving::at(const Station& station, double time) const {
     return found;
 }
 
-double CrackDriving::critical_time(const Station& station, double toughness) const {
-    if (station.crack < 0 || station.states.empty()) return never;
-    const std::vector<LoadState>& states = station.states;
-    const std::size_t tip = 2 * station.crack + station.at_end;
-    const bool finite_advance = !station.ahead.empty();
-    const double needed = finite_advance ? toughness * station.route_length() * station.thickness : toughness;
-    // What is left over at each state [J, or J/m^2 for advance 0], and its slope.
-    std::vector<double> excess, slope;
-    for (std::size_t i = 0; i < states.size(); ++i) {
-        excess.push_back((finite_advance ? states[i].potential - station.ahead[i][0] : states[i].tips[tip].G) - needed);
-        slope.push_back(finite_advance ? states[i].power - station.ahead[i][1] : 0.0);
+double Station::critical_time(double toughness) const {
+    const std::size_t tip = 2 * crack + at_end;
+    const bool finite_advance = route.size() > 1;
+    const double needed = finite_advance ? toughness * route_length() * thickness : toughness;
+    // Where what is released and what it costs are both known: what is left over [J, or J/m^2 for advance 0], and its slope.
+    std::vector<double> time, excess, slope;
+    for (const auto& [number, state] : states) {
+        const auto further = ahead.find(number);
+        if (finite_advance && further == ahead.end()) continue;
+        time.push_back(state.time);
+        excess.push_back((finite_advance ? state.potential - further->second[0] : state.tips[tip].G) - needed);
+        slope.push_back(finite_advance ? state.power - further->second[1] : 0.0);
     }
-    if (states.size() == 1) return excess[0] >= 0.0 ? states[0].time : never;
+    if (time.empty()) return never;
+    if (time.size() == 1) return excess[0] >= 0.0 ? time[0] : never;
     double found = never;
     if (linear) {  // times 0, T/2, T
-        const double T = states[2].time;
+        const double T = time[2];
         const double c2 = 2.0 * (excess[0] - 2.0 * excess[1] + excess[2]) / (T * T);
         const double c1 = (excess[2] - excess[0]) / T - c2 * T;
         found = first_rise(excess[0], c1, c2);
     } else {
         std::size_t i = 1;
-        while (i + 1 < states.size() && excess[i] < 0.0) ++i;
-        const double span = states[i].time - states[i - 1].time;
-        if (excess[i] < 0.0) {  // beyond what is known by a little
-            if (excess[i - 1] + needed <= 0.0 || states[i - 1].time == 0.0) return never;
-            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(states[i].time / states[i - 1].time);
-            const double time = states[i].time * std::pow(needed / (excess[i] + needed), 1.0 / std::max(power, 0.5));
-            return time < states[i].time + most_beyond * span ? time : never;
-        }
+        while (i + 1 < time.size() && excess[i] < 0.0) ++i;
+        if (excess[i] < 0.0) return never;
+        const double span = time[i] - time[i - 1];
         if (excess[i - 1] >= 0.0) {
-            if (states[i - 1].time == 0.0) return 0.0;
-            // Below what is known: the energy released goes as a power of the time there.
-            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(states[i].time / states[i - 1].time);
-            return states[i - 1].time * std::pow(needed / (excess[i - 1] + needed), 1.0 / std::max(power, 0.5));
+            // Below what is known: the energy released goes as a power of the time.
+            if (time[i - 1] == 0.0) return 0.0;
+            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(time[i] / time[i - 1]);
+            return time[i - 1] * std::pow(needed / (excess[i - 1] + needed), 1.0 / std::max(power, 0.5));
         }
         double low = 0.0, high = 1.0;
         for (int k = 0; k < 60; ++k) {
             const double s = 0.5 * (low + high);
-            double value = std::lerp(excess[i - 1], excess[i], s);
-            if (finite_advance) {
-                value = cubic(excess[i - 1], span * slope[i - 1], excess[i], span * slope[i], s);
-            } else if (states[i - 1].time > 0.0) {  // G by its roots, which go nearly linearly with the load
+            double value = cubic(excess[i - 1], span * slope[i - 1], excess[i], span * slope[i], s);
+            if (!finite_advance) {  // G by its roots, which go nearly linearly with the load
                 const double root = std::lerp(std::sqrt(std::max(0.0, excess[i - 1] + needed)), std::sqrt(excess[i] + needed), s);
                 value = root * root - needed;
             }
             (value < 0.0 ? low : high) = s;
         }
-        found = states[i - 1].time + high * span;
+        found = time[i - 1] + high * span;
     }
     return found <= still_from * (1.0 + 1e-12) ? found : never;
 }

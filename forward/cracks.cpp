@@ -15,10 +15,10 @@ namespace {
 // which is stiffer than that field, has 4.1 to 4.3 at nu = 0 to 0.33 and 3.7 at 0.45 (`UnitTies.EnergyGoesLinearlyWithTheTip`).
 constexpr double pair_compliance = 4.2;
 
-// Where the grid's own crack ends: a crack whose last tied pair lies at x releases the energy of one that ends this part of a cell
-// behind x, because the cells at the tip are stiffer than the near-tip field. Known from G of a centre crack against the exact
-// value at 5, 10 and 20 cells per half crack, where the error is this shift alone (`VerificationCentreCrack`).
-constexpr double tip_shift = 0.19;
+// A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip
+// field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against the
+// exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
+constexpr double tip_lag = 0.25;
 
 // Masks are kept in eight bits.
 constexpr int most_cracks = 8;
@@ -136,8 +136,12 @@ double CrackFields::freed(int crack, int node) const {
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
         if (!tip->inside) continue;
-        const auto ahead = exit_distance(tip->position, tip->direction, support);
-        if (ahead) least = std::min(least, 1.0 + tip_shift - *ahead / tip->direction.cwiseAbs().dot(body_->layout.cell));
+        if (!exit_distance(tip->position, tip->direction, support)) continue;
+        // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
+        // and would free the nodes far off an oblique crack too early.
+        const Vec2 cell_along = tip->direction.cwiseProduct(body_->layout.cell);
+        const double ahead = (x - tip->position).dot(tip->direction) + tip_lag * cell_along.norm();
+        least = std::min(least, 0.5 - ahead / cell_along.lpNorm<1>());
     }
     return std::max(0.0, least);
 }
@@ -190,7 +194,7 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         const int other = other_mask == 0 ? node : known->second;
         // The wood that counts is where the tip is, on the way, when it frees the pair.
         const bool at_end = (x - lines[k].end.position).squaredNorm() <= (x - lines[k].start.position).squaredNorm();
-        const Vec2 on_the_way = x + (0.5 - tip_shift) * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
+        const Vec2 on_the_way = x + tip_lag * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
         const double plane_modulus = materials_->average(on_the_way, 0.5 * body_->layout.cell).plane_modulus();
         const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
         pairs.push_back({own_is_left ? own : other, own_is_left ? other : own, node, k,

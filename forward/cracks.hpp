@@ -46,12 +46,12 @@ struct FieldPair {
 /// another field of that node. Fields are numbered: the nodes first, then further fields as cracks call for them.
 ///
 /// A crack tip lies anywhere in a cell, but a pair of fields is either there or not, which alone would move the tip in steps of
-/// a cell. So a pair is tied by springs while the tip crosses the last cell of the node's support, and the spring yields such
+/// a cell. So a pair is tied by springs while the tip passes its node, over the width of a cell, and the spring yields such
 /// that the energy released goes linearly with the tip: with c the compliance of the pair and f the part of the way that the
 /// tip has gone, the energy released is 1/2 F^2 c / (1 + s c), which is f times that of the free pair when s = (1 - f) / (f c).
 class CrackFields {
   public:
-    /// A pair appears once the tip has gone `least_freed` of the way across the last cell of the node's support: with less, the
+    /// A pair appears once the tip has gone `least_freed` of that way: with less, the
     /// tie would be stiffer still, which shortens an explicit time step for nothing.
     CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed);
 

@@ -1,7 +1,11 @@
 #include "forward/energy_release.hpp"
 
+#include "forward/near_tip_field.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 namespace crampfit {
 
@@ -101,41 +105,165 @@ class Extension {
     bool at_end_;
 };
 
-double energy_release_rate(const Discretisation& body, const CrackLine& line, bool at_end, const NodalState& nodal,
-                           const EnergyReleaseOptions& options) {
-    const Points& points = body.points;
-    const Extension extension(body, line, at_end, options);
-    double sum = 0.0;
-    body.for_cells_near(line.tip(at_end).position, extension.outer, [&](int c) {
+// Calls visit(p, q, gradient of q) for every point that the virtual extension moves or strains.
+template <class Visit>
+void for_points_in(const Discretisation& body, const Vec2& tip, const Extension& extension, Visit visit) {
+    body.for_cells_near(tip, extension.outer, [&](int c) {
         const std::array<int, 4> nodes = body.layout.cell_nodes(c);
         std::array<Vec2, 4> q_node;
         for (int k = 0; k < 4; ++k) q_node[k] = extension.at(nodes[k]);
         if (std::all_of(q_node.begin(), q_node.end(), [](const Vec2& q) { return q.isZero(); })) return;
-        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-            const CellWeights& w = body.weights[points.slot[p]];
+        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
+            const CellWeights& w = body.weights[body.points.slot[p]];
             Vec2 q = Vec2::Zero();
             Mat2 q_gradient = Mat2::Zero();
             for (int k = 0; k < 4; ++k) {
                 q += w.value[k] * q_node[k];
                 q_gradient += q_node[k] * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
             }
-            const Mat2 u_gradient = gradient_at(body, p, nodal.displacement);
-            const PointState state = elastic_state(u_gradient, points.stiffness_of(p), options.rotates);
-            const Vec2 v = value_at(body, p, nodal.velocity);
-            const Vec2 a = value_at(body, p, nodal.acceleration);
-            const Mat2 v_gradient = gradient_at(body, p, nodal.velocity);
-            const double density = points.density(p);
-            double integrand = (state.stress.transpose() * u_gradient).cwiseProduct(q_gradient.transpose()).sum() -
-                               (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
-                               density * (a.dot(u_gradient * q) - v.dot(v_gradient * q));
-            if (!points.changes.empty() && points.changes[p]) {
-                const WoodGradient wood(body, p);
-                integrand -= (wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density).dot(q);
-            }
-            sum += integrand * points.volume[p];
+            visit(p, q, q_gradient);
         }
     });
+}
+
+double energy_release_rate(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal,
+                           bool rotates) {
+    const Points& points = body.points;
+    double sum = 0.0;
+    for_points_in(body, tip, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
+        const Mat2 u_gradient = gradient_at(body, p, nodal.displacement);
+        const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
+        const Vec2 v = value_at(body, p, nodal.velocity);
+        const Vec2 a = value_at(body, p, nodal.acceleration);
+        const Mat2 v_gradient = gradient_at(body, p, nodal.velocity);
+        const double density = points.density(p);
+        double integrand = (state.stress.transpose() * u_gradient).cwiseProduct(q_gradient.transpose()).sum() -
+                           (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
+                           density * (a.dot(u_gradient * q) - v.dot(v_gradient * q));
+        if (!points.changes.empty() && points.changes[p]) {
+            const WoodGradient wood(body, p);
+            integrand -= (wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density).dot(q);
+        }
+        sum += integrand * points.volume[p];
+    });
     return sum / body.layout.thickness;
+}
+
+// How the wood around the tip has turned as a whole.
+Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal) {
+    Mat2 sum = Mat2::Zero();
+    int count = 0;
+    for_points_in(body, tip, extension, [&](int p, const Vec2&, const Mat2&) {
+        sum += gradient_at(body, p, nodal.displacement);
+        ++count;
+    });
+    return Polar(sum / count).turn;
+}
+
+// On the left of the crack, seen toward the tip.
+bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
+    double nearest = std::numeric_limits<double>::infinity();
+    double side = 0.0;
+    for (std::size_t k = 0; k + 1 < line.points.size(); ++k) {
+        const Vec2 along = line.points[k + 1] - line.points[k];
+        const Vec2 arm = x - line.points[k] - nearest_on_segment(line.points[k], line.points[k + 1], x) * along;
+        const double here = (at_end ? 1.0 : -1.0) * cross(along.normalized(), arm);
+        const double distance = arm.norm();
+        // Nearest to a corner: the segment that x stands off farther knows the side.
+        const bool as_near = distance < nearest * (1.0 + 1e-9);
+        if (distance < nearest * (1.0 - 1e-9) || (as_near && std::abs(here) > std::abs(side))) side = here;
+        nearest = std::min(nearest, distance);
+    }
+    return side > 0.0;
+}
+
+// Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi on
+// its right, or a little beyond where the crack bends.
+double angle_from_tip(const CrackLine& line, bool at_end, const Vec2& x) {
+    const CrackTip& tip = line.tip(at_end);
+    const Vec2 arm = x - tip.position;
+    const double angle = std::atan2(cross(tip.direction, arm), tip.direction.dot(arm));
+    if (std::abs(angle) < 0.5 * std::numbers::pi) return angle;
+    const bool left = is_left_of(line, at_end, x);
+    if (left == (angle > 0.0)) return angle;
+    return angle + (left ? 2.0 : -2.0) * std::numbers::pi;
+}
+
+// What a point adds to the interaction integral, as seen in some axes.
+struct Seen {
+    Mat2 gradient;      // of the displacement
+    Mat2 stress;        // [Pa]
+    Mat2 strain;
+    Vec2 inertia;       // density times acceleration [N/m^3]
+    Vec2 q;             // virtual extension
+    Mat2 q_gradient;    // [1/m]
+
+    Seen in(const Mat2& axes) const {
+        const Mat2 back = axes.transpose();
+        return {back * gradient * axes, back * stress * axes, back * strain * axes,
+                back * inertia,         back * q,             back * q_gradient * axes};
+    }
+};
+
+// From the frame that has turned with the wood around the tip.
+Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const Mat2& turn, bool rotates) {
+    const Mat2 gradient = gradient_at(body, p, nodal.displacement);
+    const PointState state = elastic_state(gradient, body.points.stiffness_of(p), rotates);
+    Seen seen;
+    seen.strain = state.strain;
+    seen.inertia = body.points.density(p) * value_at(body, p, nodal.acceleration);
+    if (rotates) {
+        const Mat2 back = turn.transpose();
+        seen.gradient = back * (Mat2::Identity() + gradient) - Mat2::Identity();
+        seen.stress = back * state.stress;
+        seen.inertia = back * seen.inertia;
+    } else {
+        seen.gradient = gradient - 0.5 * (turn - turn.transpose());
+        seen.stress = state.stress;
+    }
+    return seen;
+}
+
+// K_I and K_II by the interaction integral (Yau, Wang and Corten 1980), in the incompatibility form for wood that changes from
+// place to place (Dolbow and Gosz 2002; Kim and Paulino 2005):
+//     M = int [ (s_ij a_i,k + t_ij u_i,k - t_mn e_mn d_kj) q_k,j + (S_ijmn s_mn t_ij,k - e_ij t_ij,k + rho u_i,tt a_i,k) q_k ] dA
+// with a, t the near-tip displacement and stress of unit K in isotropic wood of compliance S, that at the tip; K = E' M / 2. No
+// derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen from the frame
+// that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
+// Left out: tractions on closed faces, the speed of a running tip in a and t, and the traction that t puts on the faces of a crack
+// that bends within the domain.
+Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const LocalWood& wood,
+                       const Extension& extension, const NodalState& nodal, bool rotates) {
+    const Points& points = body.points;
+    const CrackTip& tip = line.tip(at_end);
+    const double E = wood.plane_modulus();
+    const double nu = wood.elasticity.coefficients[1];  // of the plane problem
+    const std::array<NearTipField, 2> modes{NearTipField(1.0, 0.0, E, nu), NearTipField(0.0, 1.0, E, nu)};
+    const Mat2 turn = mean_turn(body, tip.position, extension, nodal);
+    const double closest = 0.25 * body.layout.point_size().minCoeff();  // a point may lie on the tip itself
+    Mat2 axes;
+    axes << tip.direction, left_of(tip.direction);
+    Vec2 sum = Vec2::Zero();
+    for_points_in(body, tip.position, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
+        Seen fixed = seen_at(body, p, nodal, turn, rotates);
+        if (points.changes.empty() && q_gradient.isZero() && fixed.inertia.isZero()) return;
+        fixed.q = q;
+        fixed.q_gradient = q_gradient;
+        const Seen s = fixed.in(axes);
+        const double r = std::max(closest, (points.position[p] - tip.position).norm());
+        const double angle = angle_from_tip(line, at_end, points.position[p]);
+        const Mat2 other_wood = ((1.0 + nu) * s.stress - nu * s.stress.trace() * Mat2::Identity()) / E - s.strain;
+        for (int mode = 0; mode < 2; ++mode) {
+            const NearTipField::At near = modes[mode].at(r, angle);
+            const Mat2 works = near.gradient.transpose() * s.stress + s.gradient.transpose() * near.stress;
+            double integrand = works.cwiseProduct(s.q_gradient).sum() -
+                               near.stress.cwiseProduct(s.strain).sum() * s.q_gradient.trace() + s.inertia.dot(near.gradient * s.q);
+            if (!points.changes.empty())
+                for (int k = 0; k < 2; ++k) integrand += s.q[k] * other_wood.cwiseProduct(near.stress_slope[k]).sum();
+            sum[mode] += integrand * points.volume[p];
+        }
+    });
+    return 0.5 * E / body.layout.thickness * sum;
 }
 
 } // namespace
@@ -146,22 +274,19 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const CrackTip& tip = line.tip(at_end);
     const double h = body.layout.cell.maxCoeff();
     const LocalWood wood = materials.average(tip.position, 0.5 * body.layout.point_size());
+    const Extension extension(body, line, at_end, options);
 
     TipLoad load;
     load.toughness = wood.toughness;
-    load.G = energy_release_rate(body, line, at_end, state, options);
+    load.G = energy_release_rate(body, tip.position, extension, state, options.rotates);
     load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
 
-    // Seen from the tip the left face of the line is the upper one at its end, the lower one at its start.
-    const Vec2 upward = at_end ? load.opening : Vec2(-load.opening);
-    const double open = upward.dot(left_of(tip.direction));
-    const double slide = upward.dot(tip.direction);
-    const double size = std::hypot(open, slide);
-    const double K = std::sqrt(std::max(0.0, load.G) * wood.plane_modulus());
-    if (size > 0.0) {
-        load.K_I = K * std::max(0.0, open) / size;
-        load.K_II = K * slide / size;
-    }
+    // Their ratio is the interaction integral's, their size G's: the two agree within the discretisation error.
+    Vec2 K = intensity_factors(body, line, at_end, wood, extension, state, options.rotates);
+    K[0] = std::max(0.0, K[0]);  // faces that touch carry no mode I
+    if (K.norm() > 0.0) K *= std::sqrt(std::max(0.0, load.G) * wood.plane_modulus()) / K.norm();
+    load.K_I = K[0];
+    load.K_II = K[1];
     return load;
 }
 

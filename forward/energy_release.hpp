@@ -34,7 +34,8 @@ struct EnergyReleaseOptions {
 /// and a virtual extension q that follows the crack):
 ///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA,
 /// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress. K_I and K_II share G = (K_I^2 + K_II^2)/E'
-/// in the ratio of the opening's components.
+/// in the ratio of their interaction integrals. K_I opens; K_II > 0 moves the face on the left, seen toward the tip, ahead, and
+/// turns a crack clockwise.
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 

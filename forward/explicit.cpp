@@ -180,7 +180,7 @@ void ExplicitSolver::grow_cracks() {
             if (time_ - last < increment / rayleigh) continue;
             last = time_;
 
-            const Vec2 direction = growth_direction(scene_.cracks[k].direction, tip, load);
+            const Vec2 direction = growth_direction(scene_.cracks[k].direction, tip, load, materials_, increment);
             books_.fracture += load.toughness * increment * body_.layout.thickness;
             adopt(cracks_.grow(k, at_end, tip.position + increment * direction));
         }

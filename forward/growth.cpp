@@ -1,15 +1,101 @@
 #include "forward/growth.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <iterator>
+#include <numbers>
 
 namespace crampfit {
 
-Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load) {
-    if (criterion == GrowthDirection::normal_to_opening) {
-        // Normal to the opening displacement (Nairn 2007), on the side that lies ahead.
-        const Vec2 normal = left_of(load.opening);
-        if (std::abs(normal.dot(tip.direction)) > 0.1 * normal.norm())
-            return normal.normalized() * (normal.dot(tip.direction) > 0 ? 1.0 : -1.0);
+namespace {
+
+Vec2 turned(const Vec2& direction, double angle) { return std::cos(angle) * direction + std::sin(angle) * left_of(direction); }
+
+Vec2 normal_to_opening(const CrackTip& tip, const Vec2& opening) {
+    // Nairn 2007, on the side that lies ahead.
+    const Vec2 normal = left_of(opening);
+    if (std::abs(normal.dot(tip.direction)) <= 0.1 * normal.norm()) return tip.direction;
+    return normal.normalized() * (normal.dot(tip.direction) > 0 ? 1.0 : -1.0);
+}
+
+// Mean over a straight way; a boundary across it is seen to 1/16 of it [J/m^2].
+double toughness_along(const MaterialMap& materials, const Vec2& from, const Vec2& way) {
+    constexpr int samples = 16;
+    double sum = 0.0;
+    for (int i = 0; i < samples; ++i) sum += materials.at(from + (i + 0.5) / samples * way).toughness;
+    return sum / samples;
+}
+
+// The angle with the largest G / G_c, both of a short branch: of all whole degrees, then of the parabola through its neighbours.
+double weakest_angle(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
+    constexpr int most = 80;  // [degrees] as far as `branch_intensities` is good
+    constexpr double degree = std::numbers::pi / 180.0;
+    const double least_toughness = 1e-3 * load.toughness;  // a void has none: it draws the crack, but the ratio stays finite
+    const auto ratio = [&](double angle) {
+        const Vec2 K = branch_intensities(angle, load.K_I, load.K_II);
+        const double opening = std::max(0.0, K[0]);  // a branch whose faces touch has no mode I
+        const Vec2 way = increment * turned(tip.direction, angle);
+        const double toughness = materials.homogeneous() ? load.toughness : toughness_along(materials, tip.position, way);
+        return (opening * opening + K[1] * K[1]) / std::max(least_toughness, toughness);
+    };
+    int best = 0;
+    double largest = ratio(0.0);
+    for (const int sense : {1, -1}) {
+        for (int k = 1; k <= most; ++k) {
+            const double here = ratio(sense * k * degree);
+            if (here <= largest) continue;
+            largest = here;
+            best = sense * k;
+        }
+    }
+    const double before = ratio((best - 1) * degree);
+    const double after = ratio((best + 1) * degree);
+    const double bend = before - 2.0 * largest + after;
+    if (std::abs(best) == most || bend >= 0.0) return best * degree;
+    const double refined = (best + 0.5 * (before - after) / bend) * degree;
+    return ratio(refined) > largest ? refined : best * degree;
+}
+
+} // namespace
+
+double hoop_stress_angle(double K_I, double K_II) {
+    // Erdogan and Sih 1963: K_I sin t + K_II (3 cos t - 1) = 0, solved for tan(t / 2) without a difference of like numbers.
+    const double size = K_I + std::sqrt(K_I * K_I + 8.0 * K_II * K_II);
+    return size > 0.0 ? -2.0 * std::atan(2.0 * K_II / size) : 0.0;
+}
+
+Vec2 branch_intensities(double angle, double K_I, double K_II) {
+    // Amestoy and Leblond 1992, the expansions of F_pq(m), for a branch much shorter than everything else, in one wood.
+    constexpr double pi = std::numbers::pi;
+    constexpr double p2 = pi * pi, p3 = p2 * pi, p4 = p2 * p2, p5 = p4 * pi, p6 = p3 * p3;
+    const double m = angle / pi;
+    const double s = m * m;
+    const auto series = [s](std::initializer_list<double> factors) {
+        double sum = 0.0;
+        for (auto factor = std::rbegin(factors); factor != std::rend(factors); ++factor) sum = sum * s + *factor;
+        return sum;
+    };
+    const double I_I = series({1.0, -3.0 * p2 / 8.0, p2 - 5.0 * p4 / 128.0, p2 / 9.0 - 11.0 * p4 / 72.0 + 119.0 * p6 / 15360.0,
+                               5.07790, -2.88312, -0.0925, 2.996, -4.059, 1.63, 4.1});
+    const double I_II = m * series({-1.5 * pi, 10.0 * pi / 3.0 + p3 / 16.0, -2.0 * pi - 133.0 * p3 / 180.0 + 59.0 * p5 / 1280.0,
+                                    12.313906, -7.32433, 1.5793, 4.0216, -6.915, 4.21, 4.56});
+    const double II_I = m * series({0.5 * pi, -4.0 * pi / 3.0 - p3 / 48.0, -2.0 * pi / 3.0 + 13.0 * p3 / 30.0 - 59.0 * p5 / 3840.0,
+                                    -6.176023, 4.44112, -1.5340, -2.0700, 4.684, -3.95, -1.32});
+    const double II_II = series({1.0, -4.0 - 3.0 * p2 / 8.0, 8.0 / 3.0 + 29.0 * p2 / 18.0 - 5.0 * p4 / 128.0,
+                                 -32.0 / 15.0 - 4.0 * p2 / 9.0 - 1159.0 * p4 / 7200.0 + 119.0 * p6 / 15360.0, 10.58254, -4.78511,
+                                 -1.8804, 7.280, -7.591, 0.25, 12.5});
+    return {I_I * K_I + I_II * K_II, II_I * K_I + II_II * K_II};
+}
+
+Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
+                      double increment) {
+    switch (criterion) {
+        case GrowthDirection::straight: return tip.direction;
+        case GrowthDirection::normal_to_opening: return normal_to_opening(tip, load.opening);
+        case GrowthDirection::hoop_stress: return turned(tip.direction, hoop_stress_angle(load.K_I, load.K_II)).normalized();
+        case GrowthDirection::energy_release_rate:
+            return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
     }
     return tip.direction;
 }

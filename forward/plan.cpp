@@ -58,10 +58,6 @@ void check_solver(const Scene& scene, bool quasistatic) {
         if (crack.advance > 0.0 && crack.grows != Growth::none && tips > 1)
             refuse(scene, key + ".advance", fmt::format("{} mm", crack.advance * 1e3),
                    "with several growing tips only 0 mm (G at the tips themselves) is available in this version");
-        if (crack.direction == GrowthDirection::hoop_stress || crack.direction == GrowthDirection::energy_release_rate)
-            refuse(scene, key + ".direction",
-                   crack.direction == GrowthDirection::hoop_stress ? "hoop stress" : "energy release rate",
-                   "not available in this version; use \"normal to opening\" or \"straight\"");
         if (crack.faces.kind == CrackFaces::Kind::friction)
             refuse(scene, key + ".faces", fmt::format("friction = {}", crack.faces.coefficient),
                    "friction is not available in this version; use \"frictionless\" or \"stick\"");
@@ -181,12 +177,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
-    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate &&
-                        std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells;
+    double least_advance = std::numeric_limits<double>::infinity();
+    for (const Crack& crack : scene.cracks)
+        if (crack.grows != Growth::none) least_advance = std::min(least_advance, crack.advance);
+    const bool fine_enough = std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells &&
+                             least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
+    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough;
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
-               : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side", least_coarse_cells)
+               : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
                                           : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");

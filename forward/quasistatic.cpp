@@ -11,6 +11,8 @@ namespace crampfit {
 
 namespace {
 
+constexpr double never = std::numeric_limits<double>::infinity();
+
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
 
@@ -23,16 +25,36 @@ constexpr int loading_steps = 32;
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
+Scene with_wide_cells(Scene scene) {
+    scene.model.cell *= 2.0;
+    return scene;
+}
+
 } // namespace
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
-                         const CrackDriving* leader)
-    : scene_(scene), plan_(plan), materials_(materials), body_(body), leader_(leader), equilibrium_(scene, plan, materials, body) {
-    driving_.linear = plan.linear;
-    driving_.still_from = plan.still_from;
+struct Quasistatic::Coarse {
+    Scene scene;
+    MaterialMap materials;
+    Quasistatic walk;
+
+    Coarse(const Scene& fine, const Plan& plan, const Quasistatic& leader)
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, &leader) {}
+};
+
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials)
+    : Quasistatic(scene, plan, materials, nullptr) {
+    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, *this);
+    const bool held = plan.linear ? know_linear(0) : know(0, 0);
+    if (!held) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+}
+
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader)
+    : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
+      equilibrium_(scene, plan, materials, body_) {
     const double end = std::min(plan.end_time, plan.still_from);
-    time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / (plan.linear ? 2 : loading_steps);
-    const double cell = body.layout.cell.minCoeff();
+    last_time_ = plan.linear ? 2 : loading_steps;
+    time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
+    const double cell = body_.layout.cell.minCoeff();
     increment_ = increment_in_cells * cell;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
@@ -42,37 +64,39 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
         ahead_ = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         increment_ = crack.advance / static_cast<double>(ahead_);
     }
-    if (leader && !leader->stations.front().route.empty()) ahead_ = leader->stations.front().route.size() - 1;
-    add_live();
+    add_place();
+    if (leader && plan.linear) know_linear(0);
 }
 
+Quasistatic::~Quasistatic() = default;
+
 // The equilibrium stands at a new place of the crack.
-void Quasistatic::add_live() {
-    Live live;
-    Station& station = live.station;
+void Quasistatic::add_place() {
+    Place& place = places_.emplace_back();
+    Station& station = place.station;
     station.thickness = body_.layout.thickness;
-    live.left = true;
+    station.linear = plan_.linear;
+    station.still_from = plan_.still_from;
+    station.left = true;
+    station.grows = !growing_.empty();
     for (const CrackLine& line : equilibrium_.cracks().lines) {
         station.tips.push_back({line.start.position, line.end.position});
         station.lengths.push_back(line.length);
     }
     for (const auto& [crack, at_end] : growing_) {
-        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
-        if (!tip.inside) continue;
-        live.left = false;
+        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
+        station.left = false;
         station.crack = crack;
         station.at_end = at_end;
     }
-    station.split = live.left && !growing_.empty();
-    if (!plan_.linear) live.snapshot = equilibrium_.save();
-    live_.push_back(std::move(live));
-    entered_ = &live_.back();
+    if (!plan_.linear) place.snapshot = equilibrium_.save();
+    entered_ = &place;
 }
 
-void Quasistatic::enter(const Live& live) {
-    if (entered_ == &live) return;
-    equilibrium_.restore(*live.snapshot);
-    entered_ = &live;
+void Quasistatic::enter(const Place& place) {
+    if (entered_ == &place) return;
+    equilibrium_.restore(*place.snapshot);
+    entered_ = &place;
 }
 
 LoadState Quasistatic::load_state() const {
@@ -81,37 +105,12 @@ LoadState Quasistatic::load_state() const {
     state.potential = equilibrium_.potential();
     state.power = equilibrium_.power();
     state.traction_work = equilibrium_.traction_work();
-    state.displacement = equilibrium_.measured_displacement(equilibrium_.time());
+    state.displacement = equilibrium_.measured_displacement(state.time);
     state.reactions = equilibrium_.reactions();
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
         for (const bool at_end : {false, true})
-            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside ? equilibrium_.load_at(k, at_end) : TipLoad{});
+            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end) : TipLoad{});
     return state;
-}
-
-// In a linear scene no load and full load say all; the state half way is between them.
-bool Quasistatic::know_linear(Live& live) {
-    const auto solve = [&](double time) {
-        ++equilibria_;
-        return equilibrium_.solve(time) == Equilibrium::Outcome::solved;
-    };
-    if (equilibrium_.boundary().tractions.empty()) {  // all goes with the load or its square
-        if (!solve(time_of(2))) return false;
-        live.states[2] = load_state();
-        for (const int number : {0, 1}) live.states[number] = scaled(live.states[2], 0.5 * number);
-        return true;
-    }
-    if (!solve(0.0)) return false;
-    const std::vector<Vec2> unloaded = equilibrium_.displacements();
-    if (plan_.driven && !solve(time_of(2))) return false;
-    const std::vector<Vec2> loaded = equilibrium_.displacements();
-    for (int number = 0; number <= 2; ++number) {
-        std::vector<Vec2> u(unloaded.size());
-        for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * number) * unloaded[f] + 0.5 * number * loaded[f];
-        equilibrium_.set_displacements(u, time_of(number));
-        live.states[number] = load_state();
-    }
-    return true;
 }
 
 // A specimen in pieces that nothing holds together carries nothing.
@@ -124,210 +123,210 @@ LoadState Quasistatic::nothing(double time) const {
     return state;
 }
 
-// Finds the equilibrium of a place at a time, if it is not known.
-bool Quasistatic::know(Live& live, int number) {
-    if (live.states.count(number)) return true;
-    enter(live);
-    double from = time_of(number);
-    if (const auto guess = live.guess.find(number); guess != live.guess.end()) {
-        equilibrium_.set_displacements(guess->second, from);
-    } else if (number > 0) {
-        if (!know(live, number - 1)) return false;
-        from = time_of(number - 1);
-        equilibrium_.set_displacements(live.displacement.at(number - 1), from);
-    } else {
-        equilibrium_.set_displacements(std::vector<Vec2>(equilibrium_.displacements().size(), Vec2::Zero()), 0.0);
+// Keeps a state of a place, made better by the second grid's.
+void Quasistatic::keep(std::size_t number, int time, LoadState state) {
+    if (coarse_) extrapolate(state, coarse_->walk.places_[number].station.states.at(time));
+    places_[number].station.states[time] = std::move(state);
+}
+
+// In a linear scene no load and full load say all; the state half way is between them.
+bool Quasistatic::know_linear(std::size_t number) {
+    if (coarse_ && !coarse_->walk.reach(number, 0.0)) return false;
+    const auto solve = [&](int time) {
+        ++equilibria_;
+        return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
+    };
+    if (equilibrium_.boundary().tractions.empty()) {  // all goes with the load or its square
+        const bool good = solve(2);
+        if (!good && !places_[number].station.left) return false;
+        const LoadState full = good ? load_state() : nothing(time_of(2));
+        for (const int time : {0, 1, 2}) keep(number, time, scaled(full, 0.5 * time));
+        return true;
     }
-    const std::vector<Vec2> start = equilibrium_.displacements();
-    for (int parts = 1; parts <= most_parts; parts *= 2) {
+    if (!solve(0)) return false;
+    const std::vector<Vec2> unloaded = equilibrium_.displacements();
+    if (plan_.driven && !solve(2)) return false;
+    const std::vector<Vec2> loaded = equilibrium_.displacements();
+    for (const int time : {0, 1, 2}) {
+        std::vector<Vec2> u(unloaded.size());
+        for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
+        equilibrium_.set_displacements(u, time_of(time));
+        keep(number, time, load_state());
+    }
+    return true;
+}
+
+// Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
+bool Quasistatic::solve_for(Place& place, int time) {
+    enter(place);
+    int from = 0;
+    std::vector<Vec2> start(equilibrium_.displacements().size(), Vec2::Zero());
+    int nearest = std::numeric_limits<int>::max();
+    for (const auto* known : {&place.displacement, &place.guess}) {
+        for (const auto& [number, displacement] : *known) {
+            if (std::abs(number - time) >= nearest) continue;
+            nearest = std::abs(number - time);
+            from = number;
+            start = displacement;
+        }
+    }
+    const int least_parts = std::max(1, std::abs(time - from));
+    for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
+        equilibrium_.set_displacements(start, time_of(from));
         bool good = true;
         for (int part = 1; part <= parts && good; ++part) {
             ++equilibria_;
-            good = equilibrium_.solve(std::lerp(from, time_of(number), static_cast<double>(part) / parts)) == Equilibrium::Outcome::solved;
+            good = equilibrium_.solve(std::lerp(time_of(from), time_of(time), static_cast<double>(part) / parts)) == Equilibrium::Outcome::solved;
         }
-        if (good) {
-            live.displacement[number] = equilibrium_.displacements();
-            live.states[number] = load_state();
-            return true;
-        }
-        equilibrium_.set_displacements(start, from);
+        if (good) return true;
     }
-    if (!live.left) return false;
-    live.displacement[number] = start;
-    live.states[number] = nothing(time_of(number));
+    return false;
+}
+
+// Finds the equilibrium of a place at a time, if it is not known.
+bool Quasistatic::know(std::size_t number, int time) {
+    Place& place = places_[number];
+    if (place.station.states.count(time)) return true;
+    if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
+    if (solve_for(place, time)) {
+        place.displacement[time] = equilibrium_.displacements();
+        keep(number, time, load_state());
+        return true;
+    }
+    if (!place.station.left) return false;
+    keep(number, time, nothing(time_of(time)));
     return true;
 }
 
-Vec2 Quasistatic::next_tip(const Live& last, const TipLoad& load) const {
+// Knows a place, and the one an advance further, at a time.
+bool Quasistatic::know_ahead(std::size_t number, int time) {
+    if (!plan_.linear && !know(number, time)) return false;
+    Station& station = places_[number].station;
+    if (station.crack < 0 || station.route.size() < 2) return true;
+    const std::size_t further = std::min(number + ahead_, places_.size() - 1);
+    if (!plan_.linear && !know(further, time)) return false;
+    const LoadState& state = places_[further].station.states.at(time);
+    station.ahead[time] = {state.potential, state.power};
+    return true;
+}
+
+Vec2 Quasistatic::next_tip(const Place& last, const TipLoad& load) const {
     const Station& station = last.station;
-    if (leader_) {
-        const std::size_t number = driving_.stations.size() + live_.size();
-        const auto& stations = leader_->stations;
-        if (number < stations.size()) return stations[number].tips[station.crack][station.at_end];
-        return stations.back().route[number - stations.size() + 1];  // the advance from the last station
-    }
+    if (leader_) return leader_->places_[places_.size()].station.tips[station.crack][station.at_end];
     const CrackTip& tip = equilibrium_.cracks().lines[station.crack].tip(station.at_end);
-    return tip.position + increment_ * growth_direction(scene_.cracks[station.crack].direction, tip, load);
+    return tip.position + increment_ * growth_direction(scene_.cracks[station.crack].direction, tip, load, materials_, increment_);
 }
 
 // Grows the crack from the last place to the next one.
-bool Quasistatic::extend() {
-    Live& last = live_.back();
-    if (last.left) return false;
-    const Station& station = last.station;
-    const LoadState* load = nullptr;
-    if (plan_.linear) {
-        load = &last.states.at(2);
-    } else {
-        const int number = static_cast<int>(std::ceil(time_ / time_step_));
-        const int known = last.states.empty() ? std::max(1, number) : std::clamp(number, last.states.begin()->first, last.states.rbegin()->first);
-        if (!know(last, known)) return false;
+bool Quasistatic::extend(double now) {
+    Place& last = places_.back();
+    Station& station = last.station;
+    if (station.left) return false;
+    int time = last_time_;
+    if (leader_) {
+        station.crack = leader_->places_[places_.size() - 1].station.crack;
+        station.at_end = leader_->places_[places_.size() - 1].station.at_end;
         enter(last);
-        load = &last.states.at(known);
-        equilibrium_.set_displacements(last.displacement.at(known), load->time);
+    } else if (!plan_.linear) {
+        time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
+        if (!know(places_.size() - 1, time)) return false;
+        enter(last);
+        equilibrium_.set_displacements(last.displacement.at(time), time_of(time));
     }
-    const Vec2 to = next_tip(last, load->tips[2 * station.crack + station.at_end]);
-    const auto fields = equilibrium_.grow(station.crack, station.at_end, to);
+    const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
+    const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));
     std::map<int, std::vector<Vec2>> guess;
-    for (auto& [number, displacement] : last.displacement) {
-        guess[number] = displacement;
-        for (const auto& [added, from] : fields) guess[number].push_back(guess[number][from]);
+    for (const auto& [known, displacement] : last.displacement) {
+        guess[known] = displacement;
+        for (const auto& [added, from] : fields) guess[known].push_back(guess[known][from]);
     }
-    add_live();
-    live_.back().guess = std::move(guess);
-    if (plan_.linear) return know_linear(live_.back()) || live_.back().left;
+    add_place();
+    places_.back().guess = std::move(guess);
+    return !plan_.linear || know_linear(places_.size() - 1);
+}
+
+bool Quasistatic::reach(std::size_t station, double now) {
+    while (places_.size() <= station + (leader_ ? 0 : ahead_) && !places_.back().station.left) {
+        if (leader_ && places_.size() >= leader_->places_.size()) break;
+        if (extend(now)) continue;
+        failure_ = "no equilibrium was found";
+        break;
+    }
+    if (station >= places_.size()) return false;
+    find_route(station);
     return true;
 }
 
-// Takes over what is known of a place and of the place an advance further, at the same times.
-bool Quasistatic::take_ahead(Live& live, const Live& ahead) {
-    Station& station = live.station;
-    station.states.clear();
-    station.ahead.clear();
-    for (const auto& [number, state] : live.states) {
-        if (ahead_ > 0 && station.crack >= 0) {
-            const auto further = ahead.states.find(number);
-            if (further == ahead.states.end()) continue;
-            station.ahead.push_back({further->second.potential, further->second.power});
-        }
-        station.states.push_back(state);
-    }
-    return !station.states.empty();
-}
-
-// Of several tips the one moves that reaches its toughness first.
-void Quasistatic::choose_tip(Station& station) const {
-    double first = std::numeric_limits<double>::infinity();
-    Station trial = station;
-    for (const auto& [crack, at_end] : growing_) {
-        trial.crack = crack;
-        trial.at_end = at_end;
-        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
-        if (!tip.inside) continue;
-        const double time = driving_.critical_time(trial, materials_.at(tip.position).toughness);
-        if (time >= first) continue;
-        first = time;
-        station.crack = crack;
-        station.at_end = at_end;
-    }
-}
-
-void Quasistatic::find_route(Station& station) const {
-    if (station.crack < 0) return;
+void Quasistatic::find_route(std::size_t number) {
+    Station& station = places_[number].station;
+    if (station.crack < 0 || leader_) return;
     station.route = {station.tips[station.crack][station.at_end]};
-    for (std::size_t k = 1; k < live_.size() && ahead_ > 0; ++k) {
-        const Vec2& tip = live_[k].station.tips[station.crack][station.at_end];
+    for (std::size_t k = number + 1; k <= number + ahead_ && k < places_.size(); ++k) {
+        const Vec2& tip = places_[k].station.tips[station.crack][station.at_end];
         if (tip != station.route.back()) station.route.push_back(tip);
     }
 }
 
-// Finds the equilibria that the leader has.
-bool Quasistatic::follow(Live& live, Live& ahead) {
-    const Station& example = leader_->stations[driving_.stations.size()];
-    live.station.crack = example.crack;
-    live.station.at_end = example.at_end;
-    find_route(live.station);
-    if (!plan_.linear) {
-        for (const LoadState& state : example.states) {
-            const int number = static_cast<int>(std::lround(state.time / time_step_));
-            if (!know(live, number) || (&live != &ahead && !know(ahead, number))) return false;
-        }
+// Of several tips the one moves that reaches its toughness first.
+void Quasistatic::choose_tip(Station& station, const MaterialMap& materials) const {
+    double first = never;
+    Station trial = station;
+    for (const auto& [crack, at_end] : growing_) {
+        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
+        trial.crack = crack;
+        trial.at_end = at_end;
+        trial.route = {station.tips[crack][at_end]};
+        const double time = trial.critical_time(mean_toughness(materials, trial.route));
+        if (time >= first) continue;
+        first = time;
+        station.crack = crack;
+        station.at_end = at_end;
+        station.route = trial.route;
     }
-    return take_ahead(live, ahead) && live.station.states.size() == example.states.size();
 }
 
-// Finds enough equilibria of a place to know when the crack moves on from it.
-bool Quasistatic::finish(Live& live, Live& ahead) {
-    if (leader_) return follow(live, ahead);
-    Station& station = live.station;
-    find_route(station);
-    const auto judge = [&] {
-        if (!take_ahead(live, ahead)) return std::numeric_limits<double>::infinity();
-        if (growing_.size() > 1) choose_tip(station);
-        if (station.crack < 0) return std::numeric_limits<double>::infinity();
-        return driving_.critical_time(station, mean_toughness(materials_, station.route));
+Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now) {
+    Station& station = places_[number].station;
+    if (station.left || station.crack < 0) return {};
+    const auto judge = [&]() -> Critical {
+        if (growing_.size() > 1) choose_tip(station, materials);
+        const double toughness = mean_toughness(materials, station.route);
+        return {station.critical_time(toughness), toughness};
+    };
+    const auto fail = [&]() -> Critical {
+        failure_ = "no equilibrium was found";
+        return {};
     };
     if (plan_.linear) {
-        time_ = std::max(time_, judge());
-        return true;
+        for (const int time : {0, 1, 2}) know_ahead(number, time);
+        return judge();
     }
-    const int last = static_cast<int>(std::ceil(std::min(plan_.end_time, plan_.still_from) / time_step_ - 1e-9));
-    int number = driving_.stations.empty() ? 0 : std::min(static_cast<int>(time_ / time_step_), last - 1);
-    const auto know_both = [&](int n) { return know(live, n) && (&live == &ahead || know(ahead, n)); };
-    if (!know_both(number)) return false;
-    while (number < last) {
-        if (!know_both(++number)) return false;
-        const double time = judge();
-        if (std::isfinite(time)) {
-            time_ = std::max(time_, time);
-            return true;
+    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
+    int high = low + 1;
+    while (true) {
+        if (!know_ahead(number, low) || !know_ahead(number, high)) return fail();
+        const Critical found = judge();
+        if (!std::isfinite(found.time)) {
+            if (high >= last_time_) return found;
+            low = high++;
+            continue;
         }
+        // Good where it lies between two states that stand next to each other, or where it has been due before.
+        const int before = static_cast<int>(found.time / time_step_);
+        if (found.time <= now || before >= last_time_) return found;
+        if (station.ahead_known(before) && station.ahead_known(before + 1)) return found;
+        low = std::max(0, before);
+        high = low + 1;
     }
-    time_ = std::numeric_limits<double>::infinity();
-    return true;
 }
 
-bool Quasistatic::step() {
-    if (finished_ || !failure_.empty()) return false;
-    if (plan_.linear && live_.size() == 1 && live_.front().states.empty() && !know_linear(live_.front()))
-        throw InputError(scene_.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
-    if (leader_ && driving_.stations.size() == leader_->stations.size()) return false;
-    while (live_.size() <= ahead_ && !live_.back().left)
-        if (!extend()) {
-            failure_ = "no equilibrium was found";
-            break;
-        }
-    Live& front = live_.front();
-    Live& ahead = live_[std::min(ahead_, live_.size() - 1)];
-    if (front.left) {
-        // Split, or nothing grows: what holds it now?
-        if (!plan_.linear) finish(front, front);
-        if (front.states.empty())
-            for (int number = 0; number <= 2; ++number) front.states[number] = nothing(time_of(number));
-        take_ahead(front, front);
-        driving_.stations.push_back(std::move(front.station));
-        finished_ = true;
-        return false;
+LoadState Quasistatic::at(std::size_t number, double time) {
+    const Station& station = places_[number].station;
+    if (!plan_.linear) {
+        const int low = std::clamp(static_cast<int>(time / time_step_), 0, last_time_ - 1);
+        if (!know(number, low) || !know(number, low + 1)) failure_ = "no equilibrium was found";
     }
-    if (!failure_.empty() || !finish(front, ahead)) {
-        if (failure_.empty()) failure_ = "no equilibrium was found";
-        if (driving_.stations.empty()) {  // not even the first: the unloaded specimen is all there is
-            front.station.states = {nothing(0.0)};
-            front.station.crack = -1;
-            driving_.stations.push_back(std::move(front.station));
-        }
-        return false;
-    }
-    if (live_.size() == 1 && std::isfinite(time_) && !extend()) failure_ = "no equilibrium was found";
-    driving_.stations.push_back(std::move(front.station));
-    if (live_.size() == 1) return false;
-    live_.pop_front();
-    return std::isfinite(time_);
-}
-
-double Quasistatic::crack_length() const {
-    if (driving_.stations.empty() || growing_.empty()) return 0.0;
-    return driving_.stations.back().lengths[growing_[0].first];
+    return station.states.empty() ? nothing(time) : station.at(time);
 }
 
 } // namespace crampfit

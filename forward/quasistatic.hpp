@@ -4,76 +4,94 @@
 #include "forward/equilibrium.hpp"
 
 #include <deque>
+#include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
 namespace crampfit {
 
-/// Walks a crack through the specimen at equilibrium: from each place of its tip it finds the equilibria, and from the energy that
-/// the next advance would release the load at which it moves on. Where that load falls the crack jumps, where it rises the crack
-/// waits for it (crack-length control; what rising displacement makes of it is `trace`'s business).
+/// The way of a crack through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
+/// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
+/// crack took when it was first followed, so that other toughnesses find most of what they need here.
+///
+/// In a linear scene three states say all about a station. Else equilibria are known at even times, and between them by
+/// interpolation.
+///
+/// Where the plan says so every state is found on a second grid too, with cells twice as wide, and a third of the difference is
+/// taken off: errors go with the square of the cell (Richardson 1911). G and K at the tips stay those of the finer grid.
 class Quasistatic {
   public:
-    /// With a `leader`, another walk in the same scene on another grid, takes the same way and knows the same times.
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
-                const CrackDriving* leader = nullptr);
+    /// `scene`, `plan` and `materials` must outlive this.
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials);
+    ~Quasistatic();
 
-    /// Adds the next station, with what is needed to know when the crack moves on from it. False: the walk is over.
-    bool step();
+    /// Follows the crack to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
+    /// has reached a free surface, or there is no equilibrium. `now` is how far the load has come [s].
+    bool reach(std::size_t station, double now);
 
-    /// The load has risen so far [s]: how long the crack has stood where it stands now.
-    double time() const { return time_; }
-    double crack_length() const;
-    const CrackDriving& driving() const { return driving_; }
-    CrackDriving take_driving() { return std::move(driving_); }
-    bool finished() const { return finished_; }                // nothing can grow any more
-    const std::string& failure() const { return failure_; }  // why the walk broke off; empty: it did not
-    int equilibria() const { return equilibria_; }
+    /// The station, with all its states that have been asked for. It must have been reached.
+    const Station& station(std::size_t number) const { return places_[number].station; }
 
-  private:
-    // A place of the crack whose equilibria can still be asked for.
-    struct Live {
-        Station station;
-        std::optional<Equilibrium::Snapshot> snapshot;
-        std::map<int, std::vector<Vec2>> displacement;  // by number of the time
-        std::map<int, std::vector<Vec2>> guess;         // the same at the place before, handed on
-        std::map<int, LoadState> states;
-        bool left = false;                              // no tip can grow any more
+    /// The load at which the crack moves on from a station.
+    struct Critical {
+        double time = std::numeric_limits<double>::infinity();  // [s]; infinite: not before the end of the loading
+        double toughness = 0;                                   // that it overcomes: the mean over the route [J/m^2]
     };
 
-    void add_live();
-    bool extend();
-    bool know(Live& live, int number);
-    bool know_linear(Live& live);
-    void enter(const Live& live);
+    /// When the crack moves on from a station if the wood is as tough as this; where that was due before `now`, roughly when.
+    Critical critical(std::size_t station, const MaterialMap& materials, double now);
+
+    /// What a station is like at a time.
+    LoadState at(std::size_t station, double time);
+
+    const std::string& failure() const { return failure_; }  // why no equilibrium was found; empty: all were
+    int equilibria() const { return equilibria_; }            // solved for so far, of the finer grid
+    long points() const { return body_.points.count(); }
+
+  private:
+    struct Place {
+        Station station;
+        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene
+        std::map<int, std::vector<Vec2>> displacement;  // by number of the time
+        std::map<int, std::vector<Vec2>> guess;         // the same of the place before, handed on
+    };
+
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader);
+    void add_place();
+    bool extend(double now);
+    void find_route(std::size_t number);
+    Vec2 next_tip(const Place& last, const TipLoad& load) const;
+    bool know(std::size_t number, int time);
+    bool know_linear(std::size_t number);
+    bool solve_for(Place& place, int time);
+    bool know_ahead(std::size_t number, int time);
+    void keep(std::size_t number, int time, LoadState state);
+    void enter(const Place& place);
     LoadState load_state() const;
-    bool take_ahead(Live& live, const Live& ahead);
-    bool finish(Live& live, Live& ahead);
-    bool follow(Live& live, Live& ahead);
-    Vec2 next_tip(const Live& last, const TipLoad& load) const;
-    void find_route(Station& station) const;
     LoadState nothing(double time) const;
-    void choose_tip(Station& station) const;
+    void choose_tip(Station& station, const MaterialMap& materials) const;
     double time_of(int number) const { return number * time_step_; }
 
     const Scene& scene_;
     const Plan& plan_;
     const MaterialMap& materials_;
-    Discretisation& body_;
-    const CrackDriving* leader_;
+    const Quasistatic* leader_;
+    Discretisation body_;
     Equilibrium equilibrium_;
-    CrackDriving driving_;
-    std::deque<Live> live_;         // from the station that is next to be finished on
-    const Live* entered_ = nullptr; // the one that the equilibrium stands at
-    std::vector<std::pair<int, bool>> growing_;  // tips: crack, at its end
-    double increment_ = 0;          // of the crack length between stations [m]
-    std::size_t ahead_ = 0;         // stations that an advance spans
-    double time_step_ = 0;          // between two times at which equilibria are known [s]
-    double time_ = 0;               // [s]
+    std::deque<Place> places_;
+    const Place* entered_ = nullptr;              // the one that the equilibrium stands at
+    std::vector<std::pair<int, bool>> growing_;   // tips: crack, at its end
+    double increment_ = 0;                        // of the crack length between stations [m]
+    std::size_t ahead_ = 0;                       // stations that an advance spans
+    double time_step_ = 0;                        // between two times at which equilibria are known [s]
+    int last_time_ = 0;                           // number of the last of them
     std::string failure_;
-    bool finished_ = false;
     int equilibria_ = 0;
+
+    struct Coarse;                                // the second grid
+    std::unique_ptr<Coarse> coarse_;
 };
 
 } // namespace crampfit

@@ -44,25 +44,25 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
     return found == record.series.end() ? record.series.back() : *found;
 }
 
-// Frames at even times. A sweep keeps no displacements: each frame is solved for anew with the crack as it was then.
-void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, const CrackDriving& driving, Record& record) {
+// Frames at even times. A walk keeps no displacements: each frame is solved for anew with the cracks as they were then.
+void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
     Discretisation body(scene, materials);
     Equilibrium equilibrium(scene, plan, materials, body);
     record.point_position = body.points.position;
     record.point_latewood = body.points.latewood;
     const TrackedTip tracked = tracked_tip(scene);
+    const auto grow = [&](const Vec2& to, int crack, bool at_end) {
+        const CrackTip& tip = equilibrium.cracks().lines[crack].tip(at_end);
+        if (tip.inside && (to - tip.position).norm() > 1e-6 * body.layout.cell.minCoeff()) equilibrium.grow(crack, at_end, to);
+    };
     std::size_t station = 0;
     for (int k = 0; k < scene.output.frames; ++k) {
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
-        const auto grow = [&](const Vec2& to, int crack, bool at_end) {
-            const CrackTip& tip = equilibrium.cracks().lines[crack].tip(at_end);
-            if (tip.inside && (to - tip.position).norm() > 1e-6 * body.layout.cell.minCoeff()) equilibrium.grow(crack, at_end, to);
-        };
         const double length = instant.crack_length * (1.0 + 1e-9);
-        while (station + 1 < driving.stations.size() && driving.stations[station].crack >= 0 &&
-               driving.stations[station + 1].lengths[tracked.crack] <= length) {
-            const Station& from = driving.stations[station++];
-            grow(driving.stations[station].tips[from.crack][from.at_end], from.crack, from.at_end);
+        while (tracked.crack >= 0 && !walk.station(station).left && walk.reach(station + 1, instant.time) &&
+               walk.station(station + 1).lengths[tracked.crack] <= length) {
+            const Station& from = walk.station(station++);
+            grow(walk.station(station).tips[from.crack][from.at_end], from.crack, from.at_end);
         }
         if (tracked.crack >= 0) grow(instant.tip, tracked.crack, tracked.at_end);
         if (equilibrium.solve(instant.time) != Equilibrium::Outcome::solved) return;
@@ -74,47 +74,20 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
-// The same walk on a grid with cells twice as wide, and what both tell of one with cells of no width.
-CrackDriving improved(const Scene& scene, const Plan& plan, CrackDriving driving) {
-    Scene coarse = scene;
-    coarse.model.cell *= 2.0;
-    const MaterialMap materials(coarse);
-    Discretisation body(coarse, materials);
-    Quasistatic walk(coarse, plan, materials, body, &driving);
-    while (walk.step()) {}
-    if (walk.driving().stations.size() < driving.stations.size()) return driving;
-    return extrapolated(driving, walk.driving());
-}
-
-Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
-                       const SimulateOptions& options) {
-    Quasistatic walk(scene, plan, materials, body);
-    const auto far_enough = [&] {
-        return walk.time() > plan.end_time || (scene.stop.crack_length && walk.crack_length() >= *scene.stop.crack_length);
-    };
-    bool interrupted = false;
-    while (walk.step() && !far_enough()) {
-        interrupted = options.stop_requested && options.stop_requested->load(std::memory_order_relaxed);
-        if (interrupted) break;
+Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const SimulateOptions& options) {
+    Quasistatic walk(scene, plan, materials);
+    const auto go_on = [&](double time, double crack_length) {
         if (options.progress) {
-            const double by_time = walk.time() / plan.end_time;
-            const double by_length = scene.stop.crack_length ? walk.crack_length() / *scene.stop.crack_length : 0.0;
-            options.progress({std::clamp(std::max(by_time, by_length), 0.0, 1.0), walk.time(), walk.crack_length(), walk.equilibria()});
+            const double by_time = time / plan.end_time;
+            const double by_length = scene.stop.crack_length ? crack_length / *scene.stop.crack_length : 0.0;
+            options.progress({std::clamp(std::max(by_time, by_length), 0.0, 1.0), time, crack_length, walk.equilibria()});
         }
-    }
-    CrackDriving driving = walk.take_driving();
-    if (plan.extrapolates && !interrupted) driving = improved(scene, plan, std::move(driving));
-    Record record = trace(scene, plan, driving, materials);
+        return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
+    };
+    Record record = trace(scene, plan, materials, walk, go_on);
     record.steps = walk.equilibria();
-    record.points = body.points.count();
-    if (scene.output.frames > 0) draw_frames(scene, plan, materials, driving, record);
-    if (interrupted) {
-        record.status = RunStatus::interrupted;
-        record.message = "stopped by the user";
-    } else if (!walk.failure().empty()) {
-        record.status = RunStatus::unstable;
-        record.message = walk.failure();
-    }
+    record.points = walk.points();
+    if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
     return record;
 }
 
@@ -156,7 +129,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
     const Plan plan = make_plan(scene, materials, body);
-    Record record = plan.quasistatic ? run_quasistatic(scene, plan, materials, body, options)
+    Record record = plan.quasistatic ? run_quasistatic(scene, plan, materials, options)
                                      : run_explicit(scene, plan, materials, body, options);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);

@@ -5,13 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace crampfit {
 
 namespace {
-
-constexpr double never = std::numeric_limits<double>::infinity();
 
 // After a jump the same instant follows once more, later by this part of the run: times stay in order.
 constexpr double just_after = 1e-9;
@@ -55,25 +52,10 @@ Moment mixed(const Moment& a, const Moment& b, double s) {
 // Writes the rows, and knows when to stop.
 class Tracer {
   public:
-    Tracer(const Scene& scene, const Plan& plan, const CrackDriving& driving, const MaterialMap& materials)
-        : scene_(scene), plan_(plan), driving_(driving), gauges_(scene), tracked_(tracked_tip(scene)) {
-        double spent = 0.0;
-        for (std::size_t i = 0; i < driving.stations.size(); ++i) {
-            const Station& station = driving.stations[i];
-            if (i > 0) {
-                const Station& before = driving.stations[i - 1];
-                if (before.crack >= 0) {
-                    const Vec2& from = before.tips[before.crack][before.at_end];
-                    const Vec2& to = station.tips[before.crack][before.at_end];
-                    const double grown = station.lengths[before.crack] - before.lengths[before.crack];
-                    spent += mean_toughness(materials, {from, to}) * grown * station.thickness;
-                }
-            }
-            fracture_energy_.push_back(spent);
-            toughness_.push_back(station.crack >= 0 ? mean_toughness(materials, station.route) : 0.0);
-            critical_.push_back(station.crack >= 0 ? driving.critical_time(station, toughness_.back()) : never);
-        }
-        sample_ = std::isfinite(plan.end_time) ? plan.end_time / scene.output.samples : last_time() / scene.output.samples;
+    Tracer(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk,
+           const std::function<bool(double, double)>& go_on)
+        : scene_(scene), plan_(plan), materials_(materials), walk_(walk), go_on_(go_on), gauges_(scene), tracked_(tracked_tip(scene)) {
+        sample_ = (std::isfinite(plan.end_time) ? plan.end_time : 1.0) / scene.output.samples;
         for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
         for (const Body& body : scene.bodies) record_.reactions.push_back({body.name, {}});
         record_.cracks.resize(scene.cracks.size());
@@ -81,9 +63,12 @@ class Tracer {
     }
 
     Record run() {
-        walk();
+        follow();
+        if (!walk_.failure().empty()) {
+            record_.status = RunStatus::unstable;
+            record_.message = walk_.failure();
+        }
         record_paths();
-        list_driving();
         if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;
         if (tracked_.crack >= 0) record_.cracks.erase(record_.cracks.begin() + tracked_.crack);
         return std::move(record_);
@@ -92,69 +77,99 @@ class Tracer {
   private:
     double end_time() const { return plan_.end_time; }
 
-    // The last critical time of the way, for scenes whose end no stop condition on time gives.
-    double last_time() const {
-        double last = 0.0;
-        for (const double time : critical_)
-            if (std::isfinite(time)) last = std::max(last, time);
-        return last > 0.0 ? last : 1.0;
+    // Takes in the next station: when the crack moves on from it, and what has been spent on the way to it.
+    bool know_station(std::size_t i, double now) {
+        if (i < critical_.size()) return true;
+        if (!walk_.reach(i, now)) return false;
+        double spent = i > 0 ? fracture_energy_.back() : 0.0;
+        if (i > 0) {
+            const Station& before = walk_.station(i - 1);
+            const Station& here = walk_.station(i);
+            const double grown = here.lengths[before.crack] - before.lengths[before.crack];
+            spent += grown * here.thickness *
+                     mean_toughness(materials_, {before.tips[before.crack][before.at_end], here.tips[before.crack][before.at_end]});
+        }
+        fracture_energy_.push_back(spent);
+        const Quasistatic::Critical found = walk_.critical(i, materials_, now);
+        critical_.push_back(found.time);
+        list_driving(i, found, now);
+        return walk_.failure().empty();
     }
 
-    Moment moment(std::size_t i, double time) const {
-        const Station& station = driving_.stations[i];
-        return {driving_.at(station, time), station.lengths, station.tips, fracture_energy_[i]};
+    Moment moment(std::size_t i, double time) {
+        const LoadState load = walk_.at(i, time);
+        return {load, walk_.station(i).lengths, walk_.station(i).tips, fracture_energy_[i]};
     }
 
-    void walk() {
-        Moment here = moment(0, 0.0);
+    void follow() {
+        Moment here = moment_at_rest();
+        if (!know_station(0, 0.0)) return;
         add(here, false);
         double now = 0.0;
         std::size_t i = 0;
         while (true) {
-            // The crack stands, or goes on as the load rises, until here.
-            if (critical_[i] > end_time() || !std::isfinite(critical_[i])) {
+            if (critical_[i] > end_time() || !std::isfinite(critical_[i])) {  // it stands to the end
                 stand(i, here, std::isfinite(end_time()) ? end_time() : now);
                 if (done_) return;
-                const bool split = driving_.stations[i].split;
-                return end(split ? RunStatus::split : RunStatus::finished,
-                           split ? "every growing crack tip has reached a free surface" : "a stop condition was met");
+                return walk_.station(i).split() ? split() : end(RunStatus::finished, "a stop condition was met");
             }
-            const Moment there = moment(i, critical_[i]);
             if (i == 0) stand(0, here, critical_[0]);
-            else go(here, there);
+            else go(here, moment(i, critical_[i]));
             if (done_) return;
-            here = there;
-            now = critical_[i];
+            here = moment(i, std::max(now, critical_[i]));
+            now = std::max(now, critical_[i]);
+            if (go_on_ && !go_on_(now, length_of(here))) return end(RunStatus::interrupted, "stopped by the user");
             // Over all that needs no more load.
             std::size_t next = i + 1;
-            while (next < critical_.size() && critical_[next] <= now && !driving_.stations[next].split) ++next;
-            if (next >= critical_.size()) return end(RunStatus::finished, "the walk ended here");
-            if (next > i + 1 || driving_.stations[next].split) {
-                Moment after = moment(next, now);
-                if (!driving_.stations[next].split && std::isfinite(critical_[next]) && critical_[next - 1] < critical_[next]) {
-                    const double s = (now - critical_[next - 1]) / (critical_[next] - critical_[next - 1]);
-                    after = mixed(moment(next - 1, now), after, std::clamp(s, 0.0, 1.0));
-                    after.load.time = now;
-                }
-                after.load.time += just_after * (std::isfinite(end_time()) ? end_time() : last_time());
-                if (beyond_length(after)) {  // stopped on the way
-                    const double stop = *scene_.stop.crack_length;
-                    std::size_t k = i + 1;
-                    while (k < next && length_of(moment(k, now)) < stop) ++k;
-                    const double time = after.load.time;
-                    after = cut_at_length(moment(k - 1, now), k == next ? after : moment(k, now), stop);
-                    after.load.time = time;
-                    add(after, true);
-                    return end(RunStatus::finished, "a stop condition was met");
-                }
+            bool known = know_station(next, now);
+            while (known && !walk_.station(next).left && critical_[next] <= now && !beyond_length(next)) {
+                if (go_on_ && !go_on_(now, walk_.station(next).lengths[std::max(0, tracked_.crack)]))
+                    return end(RunStatus::interrupted, "stopped by the user");
+                known = know_station(++next, now);
+            }
+            if (!known) return end(RunStatus::finished, "the crack's way ends here");
+            const bool left = walk_.station(next).left;
+            if (next > i + 1 || left || critical_[next] <= now) {
+                const Moment after = jump(next, now);
                 add(after, true);
                 here = after;
-                if (driving_.stations[next].split) return end(RunStatus::split, "every growing crack tip has reached a free surface");
+                if (beyond_length(after)) return end(RunStatus::finished, "a stop condition was met");
+                if (left) return split();
             }
             i = next;
         }
     }
 
+    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface"); }
+
+    // The unloaded start.
+    Moment moment_at_rest() {
+        fracture_energy_.push_back(0.0);
+        Moment rest = moment(0, 0.0);
+        fracture_energy_.clear();
+        return rest;
+    }
+
+    // Where a jump at a load ends: between the last station that needs no more load and the first that does.
+    Moment jump(std::size_t next, double now) {
+        Moment after = moment(next, now);
+        const bool arrests = !walk_.station(next).left && critical_[next] > now;
+        if (arrests && std::isfinite(critical_[next])) {
+            const double s = (now - critical_[next - 1]) / (critical_[next] - critical_[next - 1]);
+            after = mixed(moment(next - 1, now), after, std::clamp(s, 0.0, 1.0));
+        } else if (beyond_length(after) && length_of(after) > *scene_.stop.crack_length) {
+            const Moment before = moment(next - 1, now);
+            const double span = length_of(after) - length_of(before);
+            after = mixed(before, after, std::clamp((*scene_.stop.crack_length - length_of(before)) / span, 0.0, 1.0));
+        }
+        after.load.time = now + just_after * (std::isfinite(end_time()) ? end_time() : now);
+        return after;
+    }
+
+    bool beyond_length(std::size_t i) const {
+        return tracked_.crack >= 0 && scene_.stop.crack_length &&
+               walk_.station(i).lengths[tracked_.crack] >= *scene_.stop.crack_length * (1.0 - 1e-9);
+    }
     double length_of(const Moment& m) const { return tracked_.crack < 0 ? 0.0 : m.lengths[tracked_.crack]; }
     bool beyond_length(const Moment& m) const {
         return scene_.stop.crack_length && length_of(m) >= *scene_.stop.crack_length * (1.0 - 1e-9);
@@ -163,11 +178,6 @@ class Tracer {
         return scene_.stop.displacement && m.load.displacement >= *scene_.stop.displacement * (1.0 - 1e-9);
     }
     bool beyond_time(const Moment& m) const { return m.load.time >= end_time() * (1.0 - 1e-9); }
-
-    Moment cut_at_length(const Moment& a, const Moment& b, double length) const {
-        const double span = length_of(b) - length_of(a);
-        return span > 0.0 ? mixed(a, b, std::clamp((length - length_of(a)) / span, 0.0, 1.0)) : b;
-    }
 
     // From one moment to a later one, in a straight line: rows at even times, and one at the end.
     void go(const Moment& from, const Moment& to) {
@@ -256,7 +266,8 @@ class Tracer {
         const double length = record_.series.back().crack_length;
         for (std::size_t k = 0; k < scene_.cracks.size(); ++k) {
             std::vector<Vec2> path = scene_.cracks[k].points;
-            for (const Station& station : driving_.stations) {
+            for (std::size_t i = 0; i < critical_.size(); ++i) {
+                const Station& station = walk_.station(i);
                 if (tracked_.crack == static_cast<int>(k) && station.lengths[k] > length * (1.0 + 1e-12)) break;
                 if (station.tips[k][1] != path.back()) path.push_back(station.tips[k][1]);
                 if (station.tips[k][0] != path.front()) path.insert(path.begin(), station.tips[k][0]);
@@ -270,29 +281,30 @@ class Tracer {
         }
     }
 
-    void list_driving() {
-        for (std::size_t i = 0; i < driving_.stations.size(); ++i) {
-            const Station& station = driving_.stations[i];
-            if (station.crack < 0 || !std::isfinite(critical_[i])) continue;
-            const LoadState load = driving_.at(station, critical_[i]);
-            CriticalLoad row;
-            row.crack_length = station.lengths[station.crack];
-            row.tip = station.tips[station.crack][station.at_end];
-            row.displacement = load.displacement;
-            if (!load.reactions.empty()) row.force = load.reactions[gauges_.force].dot(gauges_.force_direction);
-            row.G = load.tips[2 * station.crack + station.at_end].G;
-            row.toughness = toughness_[i];
-            record_.driving.push_back(row);
-        }
+    // A place that the crack jumped over has a row where its critical load lies between equilibria that are known.
+    void list_driving(std::size_t i, const Quasistatic::Critical& found, double now) {
+        const Station& station = walk_.station(i);
+        if (station.crack < 0 || !std::isfinite(found.time)) return;
+        if (!station.linear && found.time < now && found.time < station.states.begin()->second.time) return;
+        const LoadState load = station.at(found.time);
+        CriticalLoad row;
+        row.crack_length = station.lengths[station.crack];
+        row.tip = station.tips[station.crack][station.at_end];
+        row.displacement = load.displacement;
+        if (!load.reactions.empty()) row.force = load.reactions[gauges_.force].dot(gauges_.force_direction);
+        row.G = load.tips[2 * station.crack + station.at_end].G;
+        row.toughness = found.toughness;
+        record_.driving.push_back(row);
     }
 
     const Scene& scene_;
     const Plan& plan_;
-    const CrackDriving& driving_;
+    const MaterialMap& materials_;
+    Quasistatic& walk_;
+    const std::function<bool(double, double)>& go_on_;
     Gauges gauges_;
     TrackedTip tracked_;
     std::vector<double> critical_;         // [stations] [s]
-    std::vector<double> toughness_;        // [stations] mean over the route [J/m^2]
     std::vector<double> fracture_energy_;  // [stations] [J]
     double sample_ = 0;                    // [s]
     Record record_;
@@ -305,8 +317,9 @@ class Tracer {
 
 } // namespace
 
-Record trace(const Scene& scene, const Plan& plan, const CrackDriving& driving, const MaterialMap& materials) {
-    return Tracer(scene, plan, driving, materials).run();
+Record trace(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk,
+             const std::function<bool(double, double)>& go_on) {
+    return Tracer(scene, plan, materials, walk, go_on).run();
 }
 
 } // namespace crampfit

@@ -128,11 +128,17 @@ TEST(UnitPlan, RefusesWhatItCannotDo) {
             EXPECT_EQ(error.file, "test.toml");
         }
     };
-    refused([](Scene& s) { s.solver.kind = SolverKind::quasistatic; }, "solver.kind");
+    refused([](Scene& s) { s.solver.kind = SolverKind::quasistatic; }, "solver.damping");
     refused([](Scene& s) { s.solver.shape_function = ShapeFunction::cpdi; }, "solver.shape_function");
     refused([](Scene& s) { s.solver.shape_function = ShapeFunction::bspline2; }, "solver.shape_function");
-    refused([](Scene& s) { s.cracks[0].advance = 1e-4; }, "cracks.0.advance");
-    refused([](Scene& s) { s.cracks[0].direction = GrowthDirection::hoop_stress; }, "cracks.0.direction");
+    const auto advances = [](Scene& s, Growth grows, SolverKind kind) {
+        s.cracks[0].grows = grows;
+        s.cracks[0].advance = 1e-4;
+        s.solver.kind = kind;
+        s.solver.damping = 0.0;
+    };
+    refused([&](Scene& s) { advances(s, Growth::end, SolverKind::explicit_dynamics); }, "cracks.0.advance");
+    refused([&](Scene& s) { advances(s, Growth::both, SolverKind::quasistatic); }, "cracks.0.advance");
     refused([](Scene& s) { s.cracks[0].faces = {CrackFaces::Kind::friction, 0.3}; }, "cracks.0.faces");
     refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
 }

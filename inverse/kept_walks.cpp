@@ -1,0 +1,77 @@
+#include "inverse/kept_walks.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "forward/kept_walk.hpp"
+
+#include <fmt/format.h>
+
+#include <deque>
+#include <memory>
+#include <mutex>
+
+namespace crampfit {
+namespace {
+
+// Walks that are kept at a time: a fit of moduli leaves each one behind after a few runs.
+constexpr std::size_t most_walks = 6;
+
+class Walks {
+  public:
+    explicit Walks(const std::vector<std::string>& keys) {
+        for (const std::string& key : keys) {
+            if (!key.ends_with(".toughness")) {
+                keys_.push_back(key);
+            }
+        }
+    }
+
+    Record run(const Scene& scene, const std::atomic<bool>* stop) {
+        SimulateOptions options;
+        options.stop_requested = stop;
+        const std::shared_ptr<KeptWalk> walk = walk_of(scene);
+        return walk->reusable() ? walk->run(scene, options) : simulate(scene, options);
+    }
+
+  private:
+    // What tells walks apart: the scene as it was read, and what the fit has changed in it.
+    std::string name_of(const Scene& scene) const {
+        std::string name = scene.file.string() + '\n' + scene.text;
+        for (const std::string& key : keys_) {
+            try {
+                name += fmt::format("\n{}={}", key, get_number(scene, key));
+            } catch (const InputError&) {
+                name += "\n" + key + " is not here";  // another scene's key
+            }
+        }
+        return name;
+    }
+
+    std::shared_ptr<KeptWalk> walk_of(const Scene& scene) {
+        const std::string name = name_of(scene);
+        const std::lock_guard lock(mutex_);
+        for (const auto& [known, walk] : walks_) {
+            if (known == name) {
+                return walk;
+            }
+        }
+        walks_.emplace_back(name, std::make_shared<KeptWalk>(scene));
+        if (walks_.size() > most_walks) {
+            walks_.pop_front();
+        }
+        return walks_.back().second;
+    }
+
+    std::vector<std::string> keys_;
+    std::mutex mutex_;
+    std::deque<std::pair<std::string, std::shared_ptr<KeptWalk>>> walks_;
+};
+
+}  // namespace
+
+Forward forward_with_kept_walks(const std::vector<std::string>& keys) {
+    auto walks = std::make_shared<Walks>(keys);
+    return [walks](const Scene& scene, const std::atomic<bool>* stop) { return walks->run(scene, stop); };
+}
+
+}  // namespace crampfit

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "inverse/fit.hpp"
+
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// The forward solver as a fit calls it: runs that differ from a recent one by toughness alone share its equilibria. `keys` are all
+/// that the fit changes. May be called from several threads.
+Forward forward_with_kept_walks(const std::vector<std::string>& keys);
+
+}  // namespace crampfit
