@@ -44,9 +44,15 @@ SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body) : shape
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
     steps_between_searches_ = explicit_steps_between_searches;
     const Points& points = body_.points;
+    // What a facet adds to the stiffness of a node, at most: its row of the facet's tangent, signs aside.
+    const auto added_by = [&](std::size_t i, int k) {
+        double sum = 0.0;
+        for (const double w : body_.facets[i].weight) sum += std::abs(w);
+        return stiffness_[i] * std::abs(body_.facets[i].weight[k]) * sum;
+    };
     std::vector<double> added(mass.size(), 0.0);
     for (std::size_t i = 0; i < stiffness_.size(); ++i)
-        for (int k = 0; k < 4; ++k) added[points.node[body_.facets[i].point][k]] += stiffness_[i] * body_.facets[i].weight[k];
+        for (int k = 0; k < 4; ++k) added[points.node[body_.facets[i].point][k]] += added_by(i, k);
     // A facet on a node with hardly any mass must not shorten the time step.
     for (std::size_t i = 0; i < stiffness_.size(); ++i) {
         const Facet& f = body_.facets[i];

@@ -8,6 +8,55 @@
 
 namespace crampfit {
 
+namespace {
+
+// A point that cutouts leave less of than this is left out: next to nothing would hold what pushes on it.
+constexpr double least_share = 0.02;
+
+// What cutouts leave of an upright rectangle.
+struct Remainder {
+    double share;  // of its area
+    Vec2 middle;   // [m]
+};
+
+class Cutouts {
+  public:
+    explicit Cutouts(const std::vector<Shape>& shapes) : shapes_(shapes) {
+        for (const Shape& shape : shapes) boxes_.push_back(bounds(shape));
+    }
+
+    Remainder leave_of(const Box& box) const {
+        std::vector<const Shape*> near;
+        const Vec2 centre = 0.5 * (box.low + box.high);
+        const Vec2 size = box.high - box.low;
+        for (std::size_t k = 0; k < shapes_.size(); ++k)
+            if (boxes_[k].touches(box)) near.push_back(&shapes_[k]);
+        const auto takes = [&](const Vec2& x) { return std::any_of(near.begin(), near.end(), [&](const Shape* s) { return inside(*s, x); }); };
+        const bool crossed = std::any_of(near.begin(), near.end(), [&](const Shape* s) {
+            return nearest_on_outline(*s, centre).distance < 0.5 * size.norm();
+        });
+        if (!crossed) return {takes(centre) ? 0.0 : 1.0, centre};
+        constexpr int samples = 16;  // a side
+        int left = 0;
+        Vec2 sum = Vec2::Zero();
+        for (int j = 0; j < samples; ++j) {
+            for (int i = 0; i < samples; ++i) {
+                const Vec2 x = box.low + size.cwiseProduct(Vec2(i + 0.5, j + 0.5)) / samples;
+                if (takes(x)) continue;
+                ++left;
+                sum += x;
+            }
+        }
+        return {static_cast<double>(left) / (samples * samples), left > 0 ? Vec2(sum / left) : centre};
+    }
+
+  private:
+    const std::vector<Shape>& shapes_;
+    std::vector<Box> boxes_;
+};
+
+} // namespace
+
 Layout Layout::of(const Scene& scene) {
     Layout layout;
     const auto count = [&](double length) { return std::max(1, static_cast<int>(std::lround(length / scene.model.cell))); };
@@ -57,6 +106,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
     const int columns = layout.cells_x * layout.per_side;
     points.lattice.assign(static_cast<std::size_t>(columns) * layout.cells_y * layout.per_side, -1);
     points.first_of_cell.reserve(layout.cells() + 1);
+    const Cutouts cutouts(scene.specimen.cutouts);
     for (int c = 0; c < layout.cells(); ++c) {
         points.first_of_cell.push_back(points.count());
         // Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point,
@@ -66,9 +116,9 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
             const int column = c % layout.cells_x * layout.per_side + slot % layout.per_side;
             const int row = c / layout.cells_x * layout.per_side + slot / layout.per_side;
-            const Vec2 x = size.cwiseProduct(Vec2(column + 0.5, row + 0.5));
-            const auto& cutouts = scene.specimen.cutouts;
-            if (std::any_of(cutouts.begin(), cutouts.end(), [&](const Shape& s) { return inside(s, x); })) continue;
+            const Vec2 corner = size.cwiseProduct(Vec2(column, row));
+            const auto [share, x] = cutouts.leave_of({corner, corner + size});
+            if (share < least_share) continue;
             if (materials.at(x).filled == 0.0) continue;
             points.lattice[static_cast<std::size_t>(row) * columns + column] = points.count();
             points.position.push_back(x);
@@ -79,13 +129,20 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
             const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
             for (int k = 0; k < 6; ++k) points.stiffness[k].push_back(constants[k]);
             if (!materials.homogeneous()) points.layers.push_back(wood.elasticity.coefficients);
-            points.volume.push_back(size.prod() * layout.thickness);
+            points.volume.push_back(share * size.prod() * layout.thickness);
             points.mass.push_back(wood.density * points.volume.back());
             points.poisson_ratio.push_back(wood.poisson_ratio);
             points.latewood.push_back(static_cast<float>(wood.latewood));
         }
     }
     points.first_of_cell.push_back(points.count());
+    const double whole = layout.cell.prod() * layout.thickness;
+    cell_is_full_.assign(layout.cells(), false);
+    for (int c = 0; c < layout.cells(); ++c) {
+        double filled = 0.0;
+        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) filled += points.volume[p];
+        cell_is_full_[c] = filled > (1.0 - 1e-9) * whole;
+    }
 }
 
 int Discretisation::point_at(const Vec2& x) const {
@@ -100,33 +157,6 @@ int Discretisation::point_at(const Vec2& x) const {
 
 int Discretisation::neighbour(int p, int step_x, int step_y) const {
     return point_at(points.position[p] + layout.point_size().cwiseProduct(Vec2(step_x, step_y)));
-}
-
-void Discretisation::find_facets(const Scene& scene) {
-    const Vec2 size = layout.point_size();
-    const Box rectangle{Vec2::Zero(), layout.size()};
-    for (int p = 0; p < points.count(); ++p) {
-        for (const auto& [step_x, step_y] : {std::pair{0, -1}, {1, 0}, {0, 1}, {-1, 0}}) {
-            if (neighbour(p, step_x, step_y) >= 0) continue;
-            const Vec2 normal(step_x, step_y);
-            const Vec2 face = points.position[p] + 0.5 * size.cwiseProduct(normal);
-            Facet facet{p, face, step_x != 0 ? size.y() : size.x(), normal, {}};
-            const Vec2 beyond = face + 0.25 * size.cwiseProduct(normal);
-            for (const Shape& cutout : scene.specimen.cutouts) {
-                if (!rectangle.contains(beyond)) break;
-                const OutlinePoint on = nearest_on_outline(cutout, face);
-                if (on.distance > size.norm()) continue;
-                // Each face of the staircase stands for its projection on the true outline, so that lengths add up.
-                facet.position = on.position;
-                facet.normal = -on.normal;
-                facet.length *= std::max(0.0, facet.normal.dot(normal));
-                break;
-            }
-            const Vec2 place = (facet.position - layout.cell_corner(points.cell[p])).cwiseMax(Vec2::Zero()).cwiseMin(layout.cell);
-            facet.weight = cell_weights(ShapeFunction::linear, place, layout.cell, 0.5 * size).value;
-            if (facet.length > 0.0) facets.push_back(facet);
-        }
-    }
 }
 
 } // namespace crampfit

@@ -41,9 +41,9 @@ struct Layout {
     int cell_at(const Vec2& x) const;
 };
 
-/// Material points in the undeformed specimen, in cell order: those of cell c are first_of_cell[c] .. first_of_cell[c + 1].
+/// Material points in the undeformed specimen, in cell order, with what cutouts leave of their domains as volume: those of cell c are first_of_cell[c] .. first_of_cell[c + 1].
 struct Points {
-    std::vector<Vec2> position;              // [m]
+    std::vector<Vec2> position;              // middle of what is left of its domain [m]
     std::vector<int> cell;
     std::vector<std::uint8_t> slot;          // which place in its cell, row by row
     std::vector<std::array<int, 4>> node;    // the velocity fields it belongs to at its cell's four nodes
@@ -68,11 +68,11 @@ struct Points {
     double stiffest(int p) const { return std::max(stiffness[0][p], stiffness[2][p]); }  // of both axes [Pa]
 };
 
-/// The part of a point's outline that has no neighbour: a piece of the specimen's surface. Where a cutout's outline made it, it
-/// lies on that outline and not on the staircase of the points.
+/// A short piece of the specimen's surface: of its sides, or of a cutout's true outline and not of the staircase of the points.
+/// Together they are as long as the surface. It moves with the cell that it lies in, so that the surface stays in one piece.
 struct Facet {
-    int point;
-    Vec2 position;                 // undeformed [m]
+    int point;                     // of its cell, near it: knows the fields
+    Vec2 position;                 // its middle, undeformed [m]
     double length;                 // [m]
     Vec2 normal;                   // unit, out of the specimen
     std::array<double, 4> weight;  // of the point's cell's nodes
@@ -90,8 +90,13 @@ class Discretisation {
     std::vector<CellWeights> weights;  // [points per cell] by slot
     std::vector<Facet> facets;
 
-    Box point_box(int p) const { return {points.position[p] - 0.5 * layout.point_size(), points.position[p] + 0.5 * layout.point_size()}; }
-    bool cell_is_full(int c) const { return points.first_of_cell[c + 1] - points.first_of_cell[c] == layout.points_per_cell(); }
+    Box domain(int p) const {  // of a point, whatever cutouts take of it
+        const int slot = points.slot[p];
+        const Vec2 corner = layout.point_size().cwiseProduct(Vec2(slot % layout.per_side, slot / layout.per_side));
+        const Vec2 low = layout.cell_corner(points.cell[p]) + corner;
+        return {low, low + layout.point_size()};
+    }
+    bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     int point_at(const Vec2& x) const;                 // the point whose domain holds x, or -1
     int neighbour(int p, int step_x, int step_y) const;  // the point that many places away, or -1
 
@@ -107,7 +112,12 @@ class Discretisation {
   private:
     void mark_changes();
     void place_points(const Scene& scene, const MaterialMap& materials);
+    int point_beside(const Vec2& x) const;
+    void add_facet(int p, const Vec2& position, double length, const Vec2& normal);
+    void add_void_facets(const std::vector<Shape>& cutouts);
     void find_facets(const Scene& scene);
+
+    std::vector<bool> cell_is_full_;
 };
 
 } // namespace crampfit

@@ -281,11 +281,8 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     load.G = energy_release_rate(body, tip.position, extension, state, options.rotates);
     load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
 
-    // Their ratio is the interaction integral's, their size G's: the two agree within the discretisation error.
-    Vec2 K = intensity_factors(body, line, at_end, wood, extension, state, options.rotates);
-    K[0] = std::max(0.0, K[0]);  // faces that touch carry no mode I
-    if (K.norm() > 0.0) K *= std::sqrt(std::max(0.0, load.G) * wood.plane_modulus()) / K.norm();
-    load.K_I = K[0];
+    const Vec2 K = intensity_factors(body, line, at_end, wood, extension, state, options.rotates);
+    load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
     load.K_II = K[1];
     return load;
 }
