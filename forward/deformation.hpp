@@ -86,15 +86,28 @@ inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix
     const Eigen::RowVector4d d00 = per_trace(U(0, 0), B.row(0));
     const Eigen::RowVector4d d11 = per_trace(U(1, 1), B.row(1));
     const Eigen::RowVector4d d01 = per_trace(U(0, 1), 0.5 * B.row(2));
-    Eigen::Matrix4d A = B.transpose() * stiffness * B;
-    Eigen::Matrix4d turn = Eigen::Matrix4d::Zero();  // R^T dF from dF
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j) turn.block<2, 2>(2 * i, 2 * j) = polar.turn(j, i) * Mat2::Identity();
-    if (!geometric) return turn.transpose() * A * turn;
-    A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
-    A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
-    A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
-    return turn.transpose() * A * turn;
+    Eigen::Matrix4d A = B.transpose() * (stiffness * B);
+    if (geometric) {
+        A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
+        A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
+        A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
+    }
+    // Turned back: first index by R from the left, second by R^T from the right.
+    const double c = polar.turn(0, 0);
+    const double w = polar.turn(1, 0);
+    for (int j = 0; j < 2; ++j) {
+        const Eigen::RowVector4d x = A.row(j);
+        const Eigen::RowVector4d y = A.row(2 + j);
+        A.row(j) = c * x - w * y;
+        A.row(2 + j) = w * x + c * y;
+    }
+    for (int j = 0; j < 2; ++j) {
+        const Eigen::Vector4d x = A.col(j);
+        const Eigen::Vector4d y = A.col(2 + j);
+        A.col(j) = c * x - w * y;
+        A.col(2 + j) = w * x + c * y;
+    }
+    return A;
 }
 
 /// Gradient at a point of a field given at the nodes (a displacement or a velocity).

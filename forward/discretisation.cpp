@@ -31,7 +31,9 @@ class Cutouts {
         const Vec2 size = box.high - box.low;
         for (std::size_t k = 0; k < shapes_.size(); ++k)
             if (boxes_[k].touches(box)) near.push_back(&shapes_[k]);
-        const auto takes = [&](const Vec2& x) { return std::any_of(near.begin(), near.end(), [&](const Shape* s) { return inside(*s, x); }); };
+        const auto takes = [&](const Vec2& x) {
+            return std::any_of(near.begin(), near.end(), [&](const Shape* s) { return inside(*s, x); });
+        };
         const bool crossed = std::any_of(near.begin(), near.end(), [&](const Shape* s) {
             return nearest_on_outline(*s, centre).distance < 0.5 * size.norm();
         });

@@ -41,7 +41,8 @@ struct Layout {
     int cell_at(const Vec2& x) const;
 };
 
-/// Material points in the undeformed specimen, in cell order, with what cutouts leave of their domains as volume: those of cell c are first_of_cell[c] .. first_of_cell[c + 1].
+/// Material points in the undeformed specimen, in cell order: those of cell c are first_of_cell[c] .. first_of_cell[c + 1]. What
+/// a cutout takes of a point's domain is taken off its volume.
 struct Points {
     std::vector<Vec2> position;              // middle of what is left of its domain [m]
     std::vector<int> cell;

@@ -146,26 +146,29 @@ bool Equilibrium::factor_tangent(bool geometric) {
     const Points& points = body_.points;
     entries_.clear();
     step_load_.setZero(equations_);
-    const auto point_tangent = [&](int p) {
+    const auto add_point = [&](int p, Eigen::Matrix<double, 8, 8>& sum) {
         const CellWeights& w = body_.weights[points.slot[p]];
-        Eigen::Matrix<double, 4, 8> slope = Eigen::Matrix<double, 4, 8>::Zero();  // gradient xx, xy, yx, yy per displacement
-        for (int k = 0; k < 4; ++k) {
-            slope(0, 2 * k) = slope(2, 2 * k + 1) = w.slope_x[k];
-            slope(1, 2 * k) = slope(3, 2 * k + 1) = w.slope_y[k];
-        }
         const Eigen::Matrix4d A =
-            elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(), points.stiffness_of(p), plan_.rotates,
-                            geometric);
-        return Eigen::Matrix<double, 8, 8>(points.volume[p] * slope.transpose() * A * slope);
+            points.volume[p] * elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(),
+                                               points.stiffness_of(p), plan_.rotates, geometric);
+        for (int b = 0; b < 4; ++b) {
+            for (int k = 0; k < 2; ++k) {
+                const Eigen::Vector4d stress = w.slope_x[b] * A.col(2 * k) + w.slope_y[b] * A.col(2 * k + 1);  // per displacement
+                for (int a = 0; a < 4; ++a) {
+                    sum(2 * a, 2 * b + k) += stress[0] * w.slope_x[a] + stress[1] * w.slope_y[a];
+                    sum(2 * a + 1, 2 * b + k) += stress[2] * w.slope_x[a] + stress[3] * w.slope_y[a];
+                }
+            }
+        }
     };
     for (int c = 0; c < body_.layout.cells(); ++c) {
-        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+        Eigen::Matrix<double, 8, 8> sum;
         int p = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
         while (p < last) {  // points side by side on the same fields go together
             const std::array<int, 4>& fields = points.node[p];
             sum.setZero();
-            for (; p < last && points.node[p] == fields; ++p) sum += point_tangent(p);
+            for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
             add_tangent(fields, sum);
         }
     }

@@ -25,6 +25,9 @@ constexpr int loading_steps = 32;
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
+// G at the tip over toughness below which a crack is not about to move.
+constexpr double far_below = 0.3;
+
 Scene with_wide_cells(Scene scene) {
     scene.model.cell *= 2.0;
     return scene;
@@ -170,6 +173,16 @@ bool Quasistatic::solve_for(Place& place, int time) {
             start = displacement;
         }
     }
+    // Two states in a row tell where the third will be.
+    const auto one = place.displacement.find(time - 1);
+    const auto two = place.displacement.find(time - 2);
+    if (nearest == 1 && one != place.displacement.end() && two != place.displacement.end()) {
+        std::vector<Vec2> ahead = one->second;
+        for (std::size_t f = 0; f < ahead.size(); ++f) ahead[f] += one->second[f] - two->second[f];
+        equilibrium_.set_displacements(ahead, time_of(time));
+        ++equilibria_;
+        if (equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved) return true;
+    }
     const int least_parts = std::max(1, std::abs(time - from));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(start, time_of(from));
@@ -303,6 +316,14 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     }
     int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
     int high = low + 1;
+    // As long as G at the tip is this far below the toughness, what lies ahead is not asked for; were the next advance to release
+    // more all the same, that shows later, and what is missing is found then.
+    const auto far_from_critical = [&](int time) {
+        if (growing_.size() > 1 || !know(number, time)) return false;
+        const double toughness = mean_toughness(materials, station.route);
+        return station.states.at(time).tips[2 * station.crack + station.at_end].G < far_below * toughness;
+    };
+    while (high < last_time_ && far_from_critical(high)) low = high++;
     while (true) {
         if (!know_ahead(number, low) || !know_ahead(number, high)) return fail();
         const Critical found = judge();

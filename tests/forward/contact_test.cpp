@@ -96,7 +96,9 @@ TEST(UnitFacets, AreAsLongAsTheOutlineAndPointsAsLargeAsTheArea) {
         EXPECT_NEAR(area_of_points(holes), 100e-6 - std::numbers::pi * (1.69e-6 + 1e-6), 12e-3 * 0.5 * cell / 32);
         // Two squares that overlap by a quarter of each, with parts of their outlines inside one another.
         Scene squares = block({10e-3, 10e-3}, cell);
-        const auto square = [](Vec2 low) { return Polygon{{low, low + Vec2(2e-3, 0), low + Vec2(2e-3, 2e-3), low + Vec2(0, 2e-3)}}; };
+        const auto square = [](Vec2 low) {
+            return Polygon{{low, low + Vec2(2e-3, 0), low + Vec2(2e-3, 2e-3), low + Vec2(0, 2e-3)}};
+        };
         squares.specimen.cutouts = {square({3.03e-3, 3.03e-3}), square({4.03e-3, 4.03e-3})};
         EXPECT_NEAR(length_of_facets(squares), 40e-3 + 12e-3, rounding);
     }
@@ -128,8 +130,8 @@ TEST(VerificationHertz, HalfWidthAndPeak) {
     const double p0 = 2 * P / (std::numbers::pi * a);
     EXPECT_NEAR(a, 0.2382e-3, 1e-7);
     EXPECT_NEAR(p0, 2.673e6, 1e3);
-    // Half of it, symmetric about the left side, ten half widths wide and high. The approach of the wheel grows with the logarithm
-    // of that size and is not compared; the pressure knows of it only by (a / size)^2.
+    // Half of it, symmetric about the left side, ten half widths wide and high. The approach of the wheel grows with the
+    // logarithm of that size and is not compared; the pressure knows of it only by (a / size)^2.
     const double size = 2.4e-3, cell = 0.03e-3;
     Scene scene = block({size, size}, cell);
     scene.edges = {guided("symmetry", Side::left, 0), moving("bottom", Side::bottom, {0.0, 0.0})};
@@ -164,8 +166,8 @@ TEST(VerificationHertz, HalfWidthAndPeak) {
     // Of a half ellipse: <x^2> = a^2 / 4, and the mean over the first cell is lower than the peak by h^2 / (6 a^2).
     const double half_width = 2 * std::sqrt(second / total);
     const double peak = force[0] / cell / (1 - cell * cell / (6 * a * a));
-    std::printf("Hertz, %.1f cells per half width: half width %.4f mm (%+.2f %%), peak %.3f MPa (%+.2f %%), travel %.4f mm\n", a / cell,
-                1e3 * half_width, 100 * (half_width / a - 1), 1e-6 * peak, 100 * (peak / p0 - 1), 1e3 * travel);
+    std::printf("Hertz, %.1f cells per half width: half width %.4f mm (%+.2f %%), peak %.3f MPa (%+.2f %%)\n", a / cell,
+                1e3 * half_width, 100 * (half_width / a - 1), 1e-6 * peak, 100 * (peak / p0 - 1));
     EXPECT_NEAR(half_width, a, 0.05 * a);
     EXPECT_NEAR(peak, p0, 0.05 * p0);
 }
@@ -193,8 +195,8 @@ TEST(VerificationPlates, ABlockSpreadsEvenly) {
             least = std::min(least, out);
             most = std::max(most, out);
         }
-        std::printf("block between plates, %.1f mm cells: side goes out by %.6f to %.6f mm per %%, exact 0.0214286\n", 1e3 * cell, 1e3 * least,
-                    1e3 * most);
+        std::printf("block between plates, %.1f mm cells: side goes out by %.6f to %.6f mm per %%, exact 0.0214286\n",
+                    1e3 * cell, 1e3 * least, 1e3 * most);
         EXPECT_NEAR(least, 0.0214286e-3, 0.03 * 0.0214286e-3);
         EXPECT_NEAR(most, 0.0214286e-3, 0.03 * 0.0214286e-3);
         EXPECT_LT(most - least, 1e-6 * most);
@@ -228,25 +230,40 @@ TEST(VerificationWedgeStatics, HalvesOfAWedgePushNormalToTheFlanks) {
 }
 
 TEST(VerificationWedgeStatics, WheelsPushNormalToTheFlanks) {
-    // Asked: 1 %. At this load the wheels touch a fifth of a cell, whose dent is lopsided where a cell's border is near: a tilt of a
-    // thousandth, which a steep flank turns into as much as 2 % of the ratio.
+    // Asked: 1 %. The load is small, so that the flanks have hardly turned, and a wheel touches a fifth of a cell. The dent that a
+    // cell can show leans one way or the other with the place in the cell, by a thousandth: a steep flank turns that into up to
+    // 2.5 % of the ratio, which wavers about the exact one as the wheel rolls.
+    const double cell = 0.1e-3;
     for (const double degrees : {10.0, 15.0, 20.0, 30.0}) {
         const double angle = degrees * std::numbers::pi / 180;
-        const double error = statics_error(notched(angle, 6e-3, 0.3e-3, 0.1e-3), angle, 0.02e-3);
-        std::printf("wheels on flanks at %.0f degrees: F_H / F_V %+.2f %%\n", degrees, 100 * error);
-        EXPECT_LT(std::abs(error), 0.03);
+        double mean = 0, worst = 0;
+        for (int place = 0; place < 4; ++place) {
+            Scene scene = notched(angle, 6e-3, 0.3e-3, cell);
+            for (const int side : {0, 1}) {
+                const double lower = 0.25 * place * cell;
+                const Vec2 along_flank((side == 0 ? -1 : 1) * std::tan(angle / 2), 1.0);
+                std::get<Circle>(scene.bodies[side].shape).centre -= lower * along_flank;
+            }
+            const double error = statics_error(scene, angle, 0.02e-3);
+            mean += 0.25 * error;
+            worst = std::max(worst, std::abs(error));
+        }
+        std::printf("wheels on flanks at %.0f degrees: F_H / F_V %+.2f %%, at one place up to %.2f %%\n", degrees, 100 * mean,
+                    100 * worst);
+        EXPECT_LT(worst, 0.03);
     }
 }
 
 // Downward force of both wheels after 0.2 mm on flanks of slope 2 [N/m].
 double wedge_force(double cell) {
     Rest rest(notched(slope_two, 3e-3, 0.5e-3, cell));
-    for (int k = 1; k <= 4; ++k) EXPECT_EQ(rest.equilibrium.solve(k * 0.05e-3), Equilibrium::Outcome::solved);
+    for (const double travel : {0.1e-3, 0.2e-3}) EXPECT_EQ(rest.equilibrium.solve(travel), Equilibrium::Outcome::solved);
     return -(rest.push_of(0).y() + rest.push_of(1).y());
 }
 
-TEST(VerificationWedgeForce, HardlyDependsOnTheGrid) {
-    // The wheels touch 0.2 mm of each flank, one to four cells: how a cell gives way under that is what is left of the grid.
+TEST(SlowVerificationWedgeForce, HardlyDependsOnTheGrid) {
+    // The wheels touch 0.2 mm of each flank, one to four cells, and what the wood gives way there is a tenth of the travel: that is
+    // what is left of the grid.
     const double finest = wedge_force(0.05e-3);
     for (const double cell : {0.2e-3, 0.133e-3, 0.1e-3}) {
         const double force = wedge_force(cell);
@@ -256,7 +273,7 @@ TEST(VerificationWedgeForce, HardlyDependsOnTheGrid) {
 }
 
 TEST(VerificationWedgeForce, RisesSmoothlyAsTheWheelsRoll) {
-    // Between 0.1 and 0.2 mm of travel, in steps that each roll the wheels on by a tenth of a cell: against a parabola through it.
+    // Between 0.1 and 0.2 mm of travel, in steps that each roll the wheels on by a twentieth of a cell: against a parabola.
     Rest rest(notched(slope_two, 3e-3, 0.5e-3, 0.2e-3));
     const int count = 11;
     Eigen::MatrixXd powers(count, 3);
@@ -269,7 +286,7 @@ TEST(VerificationWedgeForce, RisesSmoothlyAsTheWheelsRoll) {
     const Eigen::VectorXd off = force - powers * powers.colPivHouseholderQr().solve(force);
     const double worst = off.cwiseAbs().maxCoeff() / force.mean();
     std::printf("wedge force as the wheels roll: off a parabola by %.2f %% at most\n", 100 * worst);
-    EXPECT_LT(worst, 0.02);  // facets as long as a point: PLACEHOLDER
+    EXPECT_LT(worst, 0.02);  // one facet a point, on the staircase: 4.2 %
 }
 
 }  // namespace

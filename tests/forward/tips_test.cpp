@@ -87,10 +87,9 @@ TEST(UnitBranch, StartsAsCotterellAndRiceSay) {
 double turn(GrowthDirection criterion, double K_I, double K_II, double side = 1.0, Vec2 ahead = {1.0, 0.0}) {
     Scene scene = block({10e-3, 10e-3}, 1e-3);
     if (side != 1.0) {
-        // One ring's boundary runs through the tip, along the crack: earlywood below, latewood above.
+        // A ring's boundary runs along the crack, a micrometre above it: earlywood below, latewood above.
         scene.specimen.material.clear();
-        scene.specimen.rings = Rings{Vec2(5e-3, -100.0), 200.0, 0.5, 0.0};
-        scene.specimen.rings->pith.y() = 5e-3 - 100.0;
+        scene.specimen.rings = Rings{Vec2(5e-3, 5.001e-3 - 100.0), 200.0, 0.5, 0.0};
         scene.materials["LW"] = {40e6, 0.33, 400.0, side * earlywood().toughness};
     }
     const MaterialMap materials(scene);
@@ -131,9 +130,9 @@ TEST(UnitGrowthDirection, TougherWoodOnOneSideKeepsTheCrackOff) {
     EXPECT_GT(turn(GrowthDirection::energy_release_rate, 1.0, -0.5, 0.5), 30.0);
     EXPECT_LE(turn(GrowthDirection::energy_release_rate, 1.0, -0.5, 4.0), 0.0);
     EXPECT_GT(turn(GrowthDirection::hoop_stress, 1.0, -0.5, 4.0), 30.0);  // which knows nothing of toughness
-    // Half the toughness on one side draws a crack in pure mode I there, to where its G starts to fall.
+    // Half the toughness on one side draws a crack in pure mode I there; twice the toughness leaves it straight.
     EXPECT_GT(turn(GrowthDirection::energy_release_rate, 1.0, 0.0, 0.5), 0.5);
-    EXPECT_LT(turn(GrowthDirection::energy_release_rate, 1.0, 0.0, 2.0), 0.0);
+    EXPECT_NEAR(turn(GrowthDirection::energy_release_rate, 1.0, 0.0, 2.0), 0.0, 1e-9);
 }
 
 // --- Stress intensity
@@ -291,8 +290,9 @@ TEST(VerificationHandbook, DoubleCantileverBeam) {
     EXPECT_NEAR(load.K_I * load.K_I / E, G, 0.01 * G);
 }
 
-TEST(VerificationTipLoad, DoesNotFeelRigidRotation) {
-    // The displacement of a slanted crack, and the same seen after the plate has turned as a whole by up to 60 degrees.
+TEST(VerificationTipLoad, KDoesNotFeelRigidRotation) {
+    // The displacement of a slanted crack, and the same seen after the plate has turned as a whole by up to 60 degrees. (G is not
+    // compared: the turned plate is out of balance by the strain squared, which a virtual shift of turned wood does feel.)
     SlantedCrack plate;
     plate.angle = 30 * degree;
     plate.remote(1, 1) = 1e3;  // strains of 1e-4: what is left of finite strain is as small
@@ -314,8 +314,38 @@ TEST(VerificationTipLoad, DoesNotFeelRigidRotation) {
         const TipLoad load = tip_load(run.body, run.equilibrium.cracks(), run.materials, 0, true, {turned, rest, rest}, options);
         EXPECT_NEAR(load.K_I, still.K_I, 1e-3 * still.K_I) << angle;
         EXPECT_NEAR(load.K_II, still.K_II, 1e-3 * still.K_I) << angle;
-        EXPECT_NEAR(load.G, still.G, 2e-3 * still.G) << angle;
     }
+}
+
+// --- Paths
+
+// A crack from the left side at 45 degrees, in a block that is pulled: it turns across the load and stays in mode I, as criteria
+// that agree to first order all say (Cotterell and Rice 1980). Steps of half a cell, as the walk at equilibrium takes.
+void check_path(GrowthDirection criterion, const char* name) {
+    const double h = 0.5e-3;
+    Scene scene = at_rest({20e-3, 20e-3}, h);
+    scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"top", "top"};
+    Crack crack;
+    crack.points = {Vec2(0.0, 5e-3), Vec2(6e-3, 11e-3)};
+    scene.cracks = {crack};
+    AtRest run(scene);
+    double worst = 0.0;
+    for (int step = 0; step < 40; ++step) {
+        const CrackTip tip = run.equilibrium.cracks().lines[0].end;
+        const TipLoad load = run.load();
+        if (step > 8) worst = std::max(worst, std::abs(load.K_II / load.K_I));  // the bend lies behind the domain from then on
+        const Vec2 way = growth_direction(criterion, tip, load, run.materials, 0.5 * h);
+        run.equilibrium.grow(0, true, tip.position + 0.5 * h * way);
+        ASSERT_EQ(run.equilibrium.solve(1.0), Equilibrium::Outcome::solved);
+    }
+    std::printf("path by %s: K_II/K_I up to %.3f\n", name, worst);
+    EXPECT_LT(worst, 0.03);  // a direction to 4 degrees
+}
+
+TEST(VerificationPath, StaysInModeI) {
+    check_path(GrowthDirection::hoop_stress, "hoop stress");
+    check_path(GrowthDirection::energy_release_rate, "energy release rate");
 }
 
 // --- Layers
