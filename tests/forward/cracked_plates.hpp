@@ -55,8 +55,8 @@ inline Edge held_at(std::string name, Side side, double place, double cell, std:
     return edge;
 }
 
-/// Stress around a crack from -a to a on the x axis of an infinite plate under remote stress (Westergaard 1939, with the T-stress of
-/// Irwin; Z = z / (z^2 - a^2)^1/2) [Pa].
+/// Stress around a crack from -a to a on the x axis of an infinite plate under remote stress (Westergaard 1939, with Irwin's
+/// T-stress; Z = z / (z^2 - a^2)^1/2) [Pa].
 inline Mat2 griffith_stress(const Mat2& remote, double a, const Vec2& x) {
     using Complex = std::complex<double>;
     const Complex z(x.x(), x.y());
