@@ -61,11 +61,14 @@ class Extension {
     Extension(const Discretisation& body, const CrackLine& line, bool at_end, const EnergyReleaseOptions& options)
         : body_(body), line_(line), at_end_(at_end) {
         const double h = body.layout.cell.maxCoeff();
-        outer = std::max(options.least_outer * h, std::min(options.outer * h, distance_to_other_wood(options.outer * h)));
+        const double clear = distance_to_other_wood(options.outer * h);
+        outer = std::max(options.least_outer * h, std::min(options.outer * h, clear));
+        meets_other_wood = clear < options.least_outer * h + 0.5 * h;  // the gradient is seen a point away
         inner = std::max(options.least_inner * h, outer - (options.outer - options.inner) * h);
     }
 
-    double inner, outer;  // [m]
+    double inner, outer;            // [m]
+    bool meets_other_wood = false;  // the domain cannot keep clear of it
 
     // Unit at the tip, along the crack behind it; nothing on the specimen's outline, which stays where it is.
     Vec2 at(int node) const {
@@ -266,6 +269,14 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
     return 0.5 * E / body.layout.thickness * sum;
 }
 
+// True where the cell that holds x is made of the wood at x alone.
+bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const Vec2& x) {
+    const Vec2 half = 0.5 * body.layout.cell;
+    const Vec2 centre = body.layout.cell_corner(body.layout.cell_at(x)) + half;
+    const double here = materials.at(x).plane_modulus();
+    return std::abs(materials.average(centre, half).plane_modulus() - here) < 1e-6 * here;
+}
+
 } // namespace
 
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
@@ -284,6 +295,9 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const Vec2 K = intensity_factors(body, line, at_end, wood, extension, state, options.rotates);
     load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
     load.K_II = K[1];
+    // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: with
+    // the tip 3 cells off a boundary J is 7 % low (ring specimen against finite elements) and K^2 / E' is within 1 %.
+    if (extension.meets_other_wood && in_one_wood(body, materials, tip.position)) load.G = K.squaredNorm() / materials.at(tip.position).plane_modulus();
     return load;
 }
 

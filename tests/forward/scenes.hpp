@@ -1,9 +1,11 @@
 #pragma once
 
+#include "forward/equilibrium.hpp"
 #include "forward/explicit.hpp"
 #include "forward/simulate.hpp"
 
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace crampfit::test {
@@ -53,6 +55,40 @@ struct Trial {
     Plan plan;
     ExplicitSolver solver;
 };
+
+/// The same for equilibrium. `rotates` overrules the plan: closed forms are those of small strain.
+struct StaticTrial {
+    explicit StaticTrial(const Scene& s, std::optional<bool> rotates = {})
+        : scene(s), materials(scene), body(scene, materials), plan(overruled(make_plan(scene, materials, body), rotates)),
+          equilibrium(scene, plan, materials, body) {}
+
+    bool solve(double time) { return equilibrium.solve(time) == Equilibrium::Outcome::solved; }
+
+    Scene scene;
+    MaterialMap materials;
+    Discretisation body;
+    Plan plan;
+    Equilibrium equilibrium;
+
+  private:
+    static Plan overruled(Plan plan, std::optional<bool> rotates) {
+        plan.rotates = rotates.value_or(plan.rotates);
+        return plan;
+    }
+};
+
+/// The scene at equilibrium instead of in damped motion.
+inline Scene at_equilibrium(Scene scene) {
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.solver.damping = 0.0;
+    return scene;
+}
+
+/// A component that an edge leaves free.
+inline Edge without(Edge edge, int axis) {
+    edge.velocity[axis].reset();
+    return edge;
+}
 
 /// The ring specimen of the finite-element reference: 10 x 10 mm, pulled by 0.1 mm, edge crack of length a from the right. The
 /// latewood is made so heavy that both woods have the same wave speed: equilibrium does not feel it, and is reached sooner.

@@ -1,0 +1,448 @@
+// The static solver in its parts: derivatives, elimination, ties, and equilibria that are known.
+#include "datasets/error.hpp"
+#include "forward/sparse_factor.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <Eigen/Dense>
+#include <Eigen/SparseCholesky>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+namespace crampfit::test {
+namespace {
+
+Mat2 turn(double angle) {
+    Mat2 R;
+    R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+    return R;
+}
+
+Mat2 random_gradient(std::mt19937& random, double largest) {
+    std::uniform_real_distribution<double> in(-largest, largest);
+    Mat2 gradient;
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) gradient(i, j) = in(random);
+    return gradient;
+}
+
+// No symmetry but that of a stiffness; positive definite [Pa].
+Eigen::Matrix3d oblique_stiffness() {
+    Eigen::Matrix3d C;
+    C << 5.0, 2.0, 0.3, 2.0, 9.0, 0.4, 0.3, 0.4, 3.0;
+    return C;
+}
+
+TEST(UnitElasticity, StressIsTheSlopeOfTheEnergyAndTheTangentThatOfTheStress) {
+    // Central differences: truncation is of the order of the step squared, 1e-12, rounding of 1e-16 / step: 1e-10, times 10 Pa.
+    const Eigen::Matrix3d C = oblique_stiffness();
+    const double step = 1e-6;
+    std::mt19937 random(1);
+    for (const bool rotates : {false, true}) {
+        double worst_stress = 0, worst_tangent = 0;
+        for (const double angle : {0.0, 0.3, 1.5, -2.5}) {
+            const Mat2 strained = Mat2::Identity() + random_gradient(random, 0.2);
+            const Mat2 gradient = turn(angle) * strained - Mat2::Identity();
+            const PointState state = elastic_state(gradient, C, rotates);
+            const Eigen::Matrix4d tangent = elastic_tangent(gradient, C, rotates);
+            for (int i = 0; i < 2; ++i) {
+                for (int j = 0; j < 2; ++j) {
+                    Mat2 more = gradient, less = gradient;
+                    more(i, j) += step;
+                    less(i, j) -= step;
+                    const PointState a = elastic_state(more, C, rotates), b = elastic_state(less, C, rotates);
+                    worst_stress = std::max(worst_stress, std::abs((a.energy - b.energy) / (2 * step) - state.stress(i, j)));
+                    const Mat2 slope = (a.stress - b.stress) / (2 * step);
+                    const Eigen::Vector4d counted(slope(0, 0), slope(0, 1), slope(1, 0), slope(1, 1));
+                    worst_tangent = std::max(worst_tangent, (counted - tangent.col(2 * i + j)).norm());
+                }
+            }
+            EXPECT_LT((tangent - tangent.transpose()).norm(), 1e-12 * tangent.norm());
+        }
+        std::printf("%s: stress off by %.1e, tangent by %.1e of some 10 Pa\n", rotates ? "finite rotation" : "small strain", worst_stress,
+                    worst_tangent);
+        EXPECT_LT(worst_stress, 1e-8);
+        EXPECT_LT(worst_tangent, 1e-8);
+    }
+}
+
+TEST(UnitElasticity, StressTurnsWithThePoint) {
+    // P(R F) = R P(F), to rounding.
+    const Eigen::Matrix3d C = oblique_stiffness();
+    std::mt19937 random(2);
+    for (const double angle : {0.5, 3.0}) {
+        const Mat2 strained = Mat2::Identity() + random_gradient(random, 0.3);
+        const Mat2 still = elastic_state(strained - Mat2::Identity(), C, true).stress;
+        const Mat2 turned = elastic_state(turn(angle) * strained - Mat2::Identity(), C, true).stress;
+        EXPECT_LT((turned - turn(angle) * still).norm(), 1e-13 * still.norm());
+    }
+}
+
+TEST(UnitElasticity, WithoutItsGeometricPartTheTangentIsNeverNegative) {
+    const Eigen::Matrix3d C = oblique_stiffness();
+    std::mt19937 random(3);
+    bool whole_was_negative = false;
+    for (int trial = 0; trial < 50; ++trial) {
+        const Mat2 gradient = random_gradient(random, 0.6);
+        const auto least = [&](bool geometric) {
+            const Eigen::MatrixXd tangent = elastic_tangent(gradient, C, true, geometric);
+            return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(tangent).eigenvalues()[0];
+        };
+        EXPECT_GT(least(false), -1e-13 * C.norm());
+        whole_was_negative |= least(true) < 0.0;
+    }
+    EXPECT_TRUE(whole_was_negative) << "this test says nothing";
+    // Without stress there is no such part.
+    EXPECT_LT((elastic_tangent(turn(1.0) - Mat2::Identity(), C, true, false) - elastic_tangent(turn(1.0) - Mat2::Identity(), C, true)).norm(),
+              1e-13 * C.norm());
+}
+
+TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
+    // Cells far from a crack go side by side, cells next to it point by point: both must agree with one energy. The step is 1e-6 of a
+    // cell: truncation 1e-12, rounding 1e-9 of the force.
+    Scene scene = block({6e-3, 6e-3}, 1e-3);
+    Crack crack;
+    crack.points = {Vec2(0, 3.3e-3), Vec2(2.6e-3, 3.1e-3)};
+    scene.cracks = {crack};
+    const MaterialMap materials(scene);
+    Discretisation body(scene, materials);
+    const CrackFields cracks(scene, body, materials, 1e-3);
+    ASSERT_GT(cracks.fields(), body.layout.nodes());
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> in(-0.2e-3, 0.2e-3);
+    std::vector<Vec2> displacement(cracks.fields());
+    for (Vec2& u : displacement) u = Vec2(in(random), in(random));
+    for (const bool rotates : {false, true}) {
+        const InternalForce internal(body, rotates);
+        std::vector<Vec2> force(cracks.fields(), Vec2::Zero());
+        internal.add(displacement, force);
+        double largest = 0, worst = 0;
+        for (const Vec2& f : force) largest = std::max(largest, f.norm());
+        for (int f = 0; f < cracks.fields(); ++f) {
+            for (int axis = 0; axis < 2; ++axis) {
+                std::vector<Vec2> more = displacement, less = displacement;
+                more[f][axis] += 1e-9;
+                less[f][axis] -= 1e-9;
+                const double slope = (internal.energy(more) - internal.energy(less)) / 2e-9;
+                worst = std::max(worst, std::abs(slope + force[f][axis]));
+            }
+        }
+        std::printf("internal force, %s: off by %.1e of the largest\n", rotates ? "finite rotation" : "small strain", worst / largest);
+        EXPECT_LT(worst, 1e-7 * largest);
+    }
+}
+
+TEST(UnitDissection, CountsEveryNodeOnce) {
+    for (const auto& [x, y] : {std::pair{1, 1}, {2, 7}, {3, 3}, {13, 4}, {40, 41}}) {
+        std::vector<int> order = dissection_order(x, y);
+        std::sort(order.begin(), order.end());
+        ASSERT_EQ(order.size(), static_cast<std::size_t>(x * y));
+        for (int k = 0; k < x * y; ++k) ASSERT_EQ(order[k], k) << x << " x " << y;
+    }
+}
+
+Eigen::SparseMatrix<double> matrix_of(int size, const std::vector<Eigen::Triplet<double>>& entries) {
+    Eigen::SparseMatrix<double> matrix(size, size);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    return matrix;
+}
+
+// Entries of the Cholesky factor of a grid's nine-point matrix with the nodes in this order.
+long entries_of_factor(int side, const std::vector<int>& place) {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int j = 0; j < side; ++j)
+        for (int i = 0; i < side; ++i)
+            for (int n = std::max(0, j - 1); n <= std::min(side - 1, j + 1); ++n)
+                for (int m = std::max(0, i - 1); m <= std::min(side - 1, i + 1); ++m)
+                    entries.emplace_back(place[j * side + i], place[n * side + m], i == m && j == n ? 9.0 : -1.0);
+    const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(
+        matrix_of(side * side, entries));
+    return factor.matrixL().nestedExpression().nonZeros();
+}
+
+TEST(UnitDissection, FillsInLittle) {
+    // George (1973), theorem 2: at most 31/4 n^2 log2 n entries for n x n nodes (leading term); row by row it is n^3.
+    const int side = 64;
+    std::vector<int> by_row(side * side);
+    for (int k = 0; k < side * side; ++k) by_row[k] = k;
+    const long dissected = entries_of_factor(side, dissection_order(side, side));
+    std::printf("factor of %d x %d nodes: %ld entries, row by row %ld\n", side, side, dissected, entries_of_factor(side, by_row));
+    EXPECT_LT(dissected, 7.75 * side * side * std::log2(side));
+}
+
+Eigen::SparseMatrix<double> random_matrix(int size, std::mt19937& random) {
+    std::uniform_real_distribution<double> in(-1.0, 1.0);
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int k = 0; k < size; ++k) {
+        entries.emplace_back(k, k, 2.0 + in(random));
+        entries.emplace_back(k, (7 * k + 3) % size, in(random));
+    }
+    const Eigen::SparseMatrix<double> spread = matrix_of(size, entries);
+    return spread * Eigen::SparseMatrix<double>(spread.transpose());
+}
+
+TEST(UnitSparseFactor, SolvesAsADenseFactorDoes) {
+    std::mt19937 random(5);
+    SparseFactor factor;
+    for (const int size : {1, 7, 60}) {
+        Eigen::SparseMatrix<double> matrix = random_matrix(size, random);
+        const Eigen::MatrixXd right = Eigen::MatrixXd::Random(size, 3);
+        for (const bool new_pattern : {true, false}) {  // then other values at the same places
+            if (!new_pattern) matrix *= 1.7;
+            ASSERT_TRUE(factor.factor(matrix.triangularView<Eigen::Lower>(), new_pattern)) << size;
+            const Eigen::MatrixXd exact = Eigen::MatrixXd(matrix).ldlt().solve(right);
+            const double condition = Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues()[0] /
+                                     Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues()[size - 1];
+            EXPECT_LT((factor.solve(right) - exact).norm(), 1e-14 * condition * exact.norm()) << size;
+        }
+    }
+}
+
+TEST(UnitSparseFactor, RefusesWhatIsNotPositiveDefinite) {
+    std::mt19937 random(6);
+    SparseFactor factor;
+    const Eigen::SparseMatrix<double> good = random_matrix(20, random);
+    Eigen::SparseMatrix<double> bad = good;
+    bad.coeffRef(11, 11) = -1.0;
+    EXPECT_FALSE(factor.factor(bad.triangularView<Eigen::Lower>(), true));
+    // Two nodes and a spring that nothing holds.
+    EXPECT_FALSE(factor.factor(matrix_of(2, {{0, 0, 1.0}, {1, 0, -1.0}, {1, 1, 1.0}}), true));
+    EXPECT_TRUE(factor.factor(good.triangularView<Eigen::Lower>(), true)) << "a refusal must not spoil the next matrix";
+}
+
+TEST(UnitSparseFactor, ConditionOfADiagonal) {
+    SparseFactor factor;
+    ASSERT_TRUE(factor.factor(matrix_of(2, {{0, 0, 1.0}, {1, 1, 100.0}}), true));
+    EXPECT_NEAR(factor.reciprocal_condition(), 0.01, 1e-14);
+}
+
+// Shares of a cell's energy release that are given off when the tip has gone a quarter, a half and three quarters of the cell.
+std::array<double, 3> shares_of_a_cell(double poisson_ratio, double lift) {
+    const double h = 1e-3;
+    Scene scene = at_equilibrium(block({40e-3, 30e-3}, h));
+    scene.materials["EW"].poisson_ratio = poisson_ratio;
+    scene.edges = {moving("top", Side::top, {0.0, 1e-3}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 1.0;
+    const double y = (15.0 + lift) * h;
+    const double start = (20.0 - 0.25) * h;  // where the tip starts to free a pair: see `tip_lag` in forward/cracks.cpp
+    Crack crack;
+    crack.points = {Vec2(0.0, y), Vec2(start, y)};
+    scene.cracks = {crack};
+    StaticTrial run(scene);
+    std::array<double, 5> potential{};
+    for (int k = 0; k <= 4; ++k) {
+        if (k > 0) run.equilibrium.grow(0, true, Vec2(start + 0.25 * k * h, y));
+        EXPECT_TRUE(run.solve(1.0));
+        potential[k] = run.equilibrium.potential();
+    }
+    const double all = potential[0] - potential[4];
+    return {(potential[0] - potential[1]) / all, (potential[0] - potential[2]) / all, (potential[0] - potential[3]) / all};
+}
+
+TEST(UnitTies, EnergyGoesLinearlyWithTheTip) {
+    for (const double poisson_ratio : {0.0, 0.2, 0.33, 0.45}) {
+        for (const double lift : {0.0, 0.25, 0.5}) {
+            const auto share = shares_of_a_cell(poisson_ratio, lift);
+            std::printf("nu %.2f, crack %.2f of a cell above nodes: share given off %.3f %.3f %.3f\n", poisson_ratio, lift, share[0],
+                        share[1], share[2]);
+            for (int k = 0; k < 3; ++k) EXPECT_NEAR(share[k], 0.25 * (k + 1), 0.03) << poisson_ratio << " " << lift;
+        }
+    }
+}
+
+// Edges without friction along them, and one node that keeps the block from sliding away.
+Scene guided_block(double cell) {
+    Scene scene = at_equilibrium(block({10e-3, 20e-3}, cell));
+    Edge corner = moving("corner", Side::bottom, {0.0, 0.0});
+    corner.range = {{0.0, 0.0}};
+    scene.edges = {without(moving("bottom", Side::bottom, {0.0, 0.0}), 0), corner};
+    scene.stop.time = 1.0;
+    return scene;
+}
+
+TEST(UnitEquilibrium, AUniaxialPullIsExact) {
+    // A line is among the shape functions, so that nothing but Newton's tolerance stands between this and the exact line.
+    const double E = 40e6, nu = 0.33, stress = 4e5;
+    for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
+        for (const bool rotates : {false, true}) {  // Biot's strain is the same straight line for stretch
+            Scene scene = guided_block(1e-3);
+            scene.model.plane = plane;
+            scene.edges.push_back(pulled("top", Side::top, {0.0, stress}));
+            scene.measure = {"top", "top"};
+            StaticTrial run(scene, rotates);
+            ASSERT_TRUE(run.solve(1.0));
+            const double modulus = plane == PlaneCondition::strain ? E / (1 - nu * nu) : E;
+            const double stretch = stress / modulus;
+            EXPECT_NEAR(run.equilibrium.measured_displacement(1.0), stretch * 20e-3, 1e-7 * stretch * 20e-3);
+            EXPECT_NEAR(run.equilibrium.reactions()[0].y(), -stress * 10e-3, 1e-7 * stress * 10e-3);
+            EXPECT_NEAR(run.equilibrium.strain_energy(), 0.5 * stress * stretch * 2e-4, 1e-7 * stress * stretch * 2e-4);
+            EXPECT_NEAR(run.equilibrium.potential(), -0.5 * stress * stretch * 2e-4, 1e-7 * stress * stretch * 2e-4);
+            for (int p = 0; p < run.body.points.count(); ++p) {
+                const Mat2 gradient = gradient_at(run.body, p, run.equilibrium.displacements());
+                const PointState state = elastic_state(gradient, run.body.points.stiffness_of(p), rotates);
+                EXPECT_NEAR(state.stress(1, 1), stress, 1e-6 * stress);
+                EXPECT_NEAR(state.stress(0, 0), 0.0, 1e-6 * stress);
+                EXPECT_NEAR(state.stress(0, 1), 0.0, 1e-6 * stress);
+            }
+        }
+    }
+}
+
+TEST(UnitEquilibrium, RigidRotationGivesNoStress) {
+    // Two corners go straight to where a rotation takes them: strained on the way, free of stress at the end.
+    const double angle = 0.5, wide = 10e-3;
+    Scene scene = at_equilibrium(block({wide, wide}, 1e-3));
+    scene.edges = {moving("hinge", Side::bottom, {0.0, 0.0}),
+                   moving("arm", Side::bottom, {wide * (std::cos(angle) - 1.0), wide * std::sin(angle)})};
+    scene.edges[0].range = {{0.0, 0.0}};
+    scene.edges[1].range = {{wide, wide}};
+    scene.measure = {"arm", "arm"};
+    scene.stop.time = 1.0;
+    StaticTrial run(scene);
+    ASSERT_TRUE(run.plan.rotates);
+    for (int k = 1; k <= 8; ++k) ASSERT_TRUE(run.solve(k / 8.0)) << k;
+    double worst = 0;
+    for (int n = 0; n < run.body.layout.nodes(); ++n) {
+        const Vec2 x = run.body.layout.node_position(n);
+        worst = std::max(worst, (run.equilibrium.displacements()[n] - (turn(angle) * x - x)).norm());
+    }
+    std::printf("rotation by %.1f: off by %.1e of the width, %d factorisations in 8 steps\n", angle, worst / wide,
+                run.equilibrium.factorisations());
+    EXPECT_LT(worst, 1e-6 * wide);  // Newton's method ends at a strain of 1e-12: balance times least_strain
+    EXPECT_LT(run.equilibrium.strain_energy(), 1e-12 * 40e6 * wide * wide);
+    EXPECT_LT(run.equilibrium.factorisations(), 8 * 8) << "Newton's method doubles the digits each time";
+}
+
+TEST(UnitEquilibrium, PowerIsTheSlopeOfThePotential) {
+    // At equilibrium dPi/dt is the power of what prescribes motion: with a wheel that slides on a flank, and rotation. Steps of 1e-3
+    // of the loading: truncation 1e-6.
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.5e-3));
+    scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.specimen.cutouts = {Polygon{{Vec2(3.5e-3, 10e-3), Vec2(6.5e-3, 10e-3), Vec2(5e-3, 7e-3)}}};
+    for (const double side : {-1.0, 1.0}) {
+        Body wheel;
+        wheel.name = side < 0 ? "left" : "right";
+        wheel.shape = Circle{Vec2(5e-3 + side * 0.5528e-3, 9.2236e-3), 0.5e-3};
+        wheel.velocity = {0.0, -1e-3};
+        scene.bodies.push_back(wheel);
+    }
+    scene.measure = {"left", "left"};
+    scene.stop.time = 1.0;
+    StaticTrial run(scene, true);
+    ASSERT_TRUE(run.solve(0.3));
+    double potential[2];
+    for (const int side : {0, 1}) {
+        ASSERT_TRUE(run.solve(0.3 + (side - 0.5) * 2e-3));
+        potential[side] = run.equilibrium.potential();
+    }
+    ASSERT_TRUE(run.solve(0.3));
+    const double slope = (potential[1] - potential[0]) / 2e-3;
+    std::printf("power %.6g W, slope of the potential off by %+.1e\n", run.equilibrium.power(), slope / run.equilibrium.power() - 1);
+    EXPECT_NEAR(slope, run.equilibrium.power(), 1e-3 * std::abs(run.equilibrium.power()));
+}
+
+TEST(UnitEquilibrium, ASpecimenThatNothingHoldsIsRefused) {
+    const auto refused = [](const char* what, const std::vector<Edge>& edges, int cells) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 10e-3 / cells));
+        scene.edges = edges;
+        scene.measure = {edges[0].name, edges[0].name};
+        scene.stop.time = 1.0;
+        try {
+            simulate(scene);
+            ADD_FAILURE() << "accepted: " << what << ", " << cells << " cells";
+        } catch (const InputError& error) {
+            EXPECT_EQ(error.key, "edges");
+            EXPECT_EQ(error.file, "test.toml");
+        }
+    };
+    const Edge top = pulled("top", Side::top, {0.0, 1e4}), bottom = pulled("bottom", Side::bottom, {0.0, -1e4});
+    Edge pin = moving("pin", Side::bottom, {0.0, 0.0});
+    pin.range = {{0.0, 0.0}};
+    for (const int cells : {4, 10, 33}) {
+        refused("two tractions and nothing that holds", {top, bottom}, cells);
+        refused("free to slide to the side", {top, without(moving("floor", Side::bottom, {0.0, 0.0}), 0)}, cells);
+        refused("free to turn about a corner", {top, bottom, pin}, cells);
+    }
+}
+
+// Stiffness of a block that a crack goes into from the right, against that of a whole one, when it is moved so [m].
+Vec2 stiffness_of_cracked(Vec2 moved, CrackFaces::Kind faces, double y) {
+    Vec2 force[2];
+    for (const bool cracked : {false, true}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
+        scene.edges = {moving("top", Side::top, moved), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.measure = {"top", "top"};
+        scene.stop.time = 1.0;
+        Crack crack;
+        crack.points = {Vec2(10e-3, y), Vec2(5e-3, y)};
+        crack.faces.kind = faces;
+        if (cracked) scene.cracks = {crack};
+        StaticTrial run(scene);
+        EXPECT_TRUE(run.solve(1.0));
+        force[cracked] = run.equilibrium.reactions()[0];
+    }
+    return force[1].cwiseQuotient(force[0]);
+}
+
+TEST(UnitCrackFaces, PressedTogetherCarryAsAWholeBlock) {
+    // Faces yield like a hundredth of a cell, 1e-3 of the block's ten cells, and over half its width only.
+    for (const double y : {5e-3, 5.3e-3, 5.5e-3}) {
+        const double pressed = stiffness_of_cracked({0.0, -1e-4}, CrackFaces::Kind::frictionless, y).y();
+        const double opened = stiffness_of_cracked({0.0, 1e-4}, CrackFaces::Kind::frictionless, y).y();
+        std::printf("crack at y = %.1f mm: pressed %.5f of a whole block's force, pulled %.3f\n", 1e3 * y, pressed, opened);
+        EXPECT_NEAR(pressed, 1.0, 1e-3);
+        EXPECT_LT(opened, 0.9);
+    }
+}
+
+TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
+    for (const double y : {5e-3, 5.5e-3}) {
+        const Vec2 moved(0.2e-4, -1e-4);
+        const double sticks = stiffness_of_cracked(moved, CrackFaces::Kind::stick, y).x();
+        const double slides = stiffness_of_cracked(moved, CrackFaces::Kind::frictionless, y).x();
+        std::printf("pressed and sheared, y = %.1f mm: shear force of stuck faces %.5f of a whole block's, of free ones %.3f\n", 1e3 * y,
+                    sticks, slides);
+        EXPECT_NEAR(sticks, 1.0, 2e-3);
+        EXPECT_LT(slides, 0.95);
+    }
+}
+
+TEST(VerificationEquilibrium, IsWhereDampedMotionComesToRest) {
+    // The one discretisation by two solvers; motion has died out to 1e-5 when the explicit run ends.
+    const Scene scene = ring_specimen(3e-3, 0.5e-3);
+    Trial moved(scene);
+    moved.until(*scene.stop.time);
+    StaticTrial rest(at_equilibrium(scene));
+    ASSERT_TRUE(rest.solve(*scene.stop.time));
+    const double force = moved.solver.reactions()[0].y() / rest.equilibrium.reactions()[0].y() - 1;
+    const double energy = moved.solver.energies().strain / rest.equilibrium.strain_energy() - 1;
+    const double rate = moved.solver.load_at(0, true).G / rest.equilibrium.load_at(0, true).G - 1;
+    std::printf("damped motion against equilibrium: force %+.1e, energy %+.1e, G %+.1e\n", force, energy, rate);
+    EXPECT_LT(std::abs(force), 1e-3);
+    EXPECT_LT(std::abs(energy), 1e-3);
+    EXPECT_LT(std::abs(rate), 1e-3);
+}
+
+TEST(UnitEquilibrium, ComesBackToWhatItSaved) {
+    Scene scene = at_equilibrium(ring_specimen(3e-3, 0.5e-3));
+    StaticTrial run(scene);
+    ASSERT_TRUE(run.solve(1e-4));
+    const Equilibrium::Snapshot saved = run.equilibrium.save();
+    const double force = run.equilibrium.reactions()[0].y(), potential = run.equilibrium.potential();
+    run.equilibrium.grow(0, true, Vec2(5.3e-3, 5e-3));
+    ASSERT_TRUE(run.solve(0.5e-4));
+    EXPECT_NE(run.equilibrium.potential(), potential);
+    run.equilibrium.restore(saved);
+    EXPECT_EQ(run.equilibrium.potential(), potential);
+    EXPECT_EQ(run.equilibrium.time(), 1e-4);
+    ASSERT_TRUE(run.solve(1e-4));
+    EXPECT_NEAR(run.equilibrium.reactions()[0].y(), force, 1e-9 * force);
+}
+
+}  // namespace
+}  // namespace crampfit::test
