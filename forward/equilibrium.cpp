@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 namespace crampfit {
 
@@ -18,7 +20,9 @@ constexpr double face_stiffness_factor = 100.0;
 
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node.
 constexpr double balance = 1e-7;
-constexpr int most_iterations = 40;
+constexpr int most_iterations = 60;
+// An old tangent goes on as long as it makes the forces out of balance smaller by this: four such steps cost as much as a new one.
+constexpr double worth_keeping = 0.25;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -246,11 +250,14 @@ void Equilibrium::take_step(const Eigen::VectorXd& step) {
 
 Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
+    bool renew = true;
+    double residual = std::numeric_limits<double>::infinity();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-        if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
+        if (renew && !factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         Eigen::VectorXd right = step_load_;
+        step_load_.setZero();
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
             if (equation_[dof] >= 0) right[equation_[dof]] += force_[dof / 2][dof % 2];
         const Eigen::VectorXd step = factor_.solve(right);
@@ -266,7 +273,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         double scale = least_force_;
         for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
         if (!(scale < INFINITY)) return Outcome::not_converged;
-        if (largest_residual() <= balance * scale) return Outcome::solved;
+        const double before = std::exchange(residual, largest_residual());
+        if (residual <= balance * scale) return Outcome::solved;
+        renew = residual > worth_keeping * before;
     }
     return Outcome::not_converged;
 }

@@ -1,4 +1,5 @@
-// Energy release rate at rest against exact values, and against the change of energy with crack length.
+// Energy release rate at rest against exact values, and against the change of energy with crack length. At equilibrium; the explicit
+// solver, damped to rest, has one check of each kind.
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -10,44 +11,59 @@
 namespace crampfit::test {
 namespace {
 
-// A centre crack of half length a in a plate of half width 4 a and half height 12 a under tension. `shift` moves each tip out and
-// `lift` moves the crack up, both in cells.
-double centre_crack_error(double cells, double shift = 0.0, double lift = 0.0) {
+// G at the end of the first crack when the load has come to its end, by either solver.
+double rate_at_rest(const Scene& scene, bool explicitly) {
+    if (explicitly) {
+        Trial run(scene);
+        run.until(*scene.stop.time);
+        return run.solver.load_at(0, true).G;
+    }
+    StaticTrial run(at_equilibrium(scene), false);
+    EXPECT_TRUE(run.solve(*scene.stop.time));
+    return run.equilibrium.load_at(0, true).G;
+}
+
+// J of a centre crack of half length a in a plate of half width 4 a and half height 12 a under tension, over the exact G, less 1.
+// `shift` moves each tip out and `lift` moves the crack up, both in cells.
+double centre_crack_error(double cells, double shift = 0.0, double lift = 0.0, bool explicitly = false) {
     const double a = 10e-3;
     const double h = a / cells;
     const double stress = 1e5;
     Scene scene = block({8 * a, 24 * a}, h);
-    scene.edges = {pulled("top", Side::top, {0.0, stress}), pulled("bottom", Side::bottom, {0.0, -stress})};
+    // The load is in balance. What keeps the plate in its place feels nothing.
+    Edge left = moving("left", Side::left, {0.0, 0.0}), right = without(moving("right", Side::right, {0.0, 0.0}), 0);
+    left.range = right.range = {{12 * a - 0.5 * h, 12 * a + 0.5 * h}};
+    scene.edges = {pulled("top", Side::top, {0.0, stress}), pulled("bottom", Side::bottom, {0.0, -stress}), left, right};
     Crack crack;
     crack.points = {Vec2(3 * a - shift * h, 12 * a + lift * h), Vec2(5 * a + shift * h, 12 * a + lift * h)};
     scene.cracks = {crack};
     scene.measure = {"top", "top"};
     scene.solver.damping = 1.5e3;
     scene.stop.time = 16e-3;
-    Trial run(scene);
-    run.until(16e-3);
     // Tada's factor, good to 0.1 % (REFERENCES: centre crack).
     const double r = (1.0 + shift / cells) / 4.0;
     const double F = (1 - .025 * r * r + .06 * r * r * r * r) / std::sqrt(std::cos(std::numbers::pi * r / 2));
     const double K_squared = stress * stress * std::numbers::pi * 4 * a * r * F * F;
     const double G = K_squared * (1 - 0.33 * 0.33) / 40e6;
-    return run.solver.load_at(0, true).G / G - 1.0;
+    return rate_at_rest(scene, explicitly) / G - 1.0;
 }
 
-void check_centre_crack(double cells, double bar) {
-    const double error = centre_crack_error(cells);
-    std::printf("centre crack, %2.0f cells per half crack: J off by %+.2f %%\n", cells, 100 * error);
+void check_centre_crack(double cells, double bar, bool explicitly = false) {
+    const double error = centre_crack_error(cells, 0.0, 0.0, explicitly);
+    std::printf("centre crack, %2.0f cells per half crack%s: J off by %+.2f %%\n", cells, explicitly ? ", explicit" : "", 100 * error);
     EXPECT_LT(std::abs(error), bar) << cells << " cells";
 }
 
 TEST(VerificationCentreCrack, JConvergesToTheExactValue) {
-    // Asked: 4 % at 10 cells per half crack. The tip shift takes out the first-order error, so that a few cells are enough.
-    for (const auto& [cells, bar] : {std::pair{5.0, 0.04}, {10.0, 0.02}}) check_centre_crack(cells, bar);
+    // Asked of a well resolved crack. The ties take the first-order error out, so that a few cells are enough.
+    for (const auto& [cells, bar] : {std::pair{5.0, 0.04}, {10.0, 0.02}, {20.0, 0.01}}) check_centre_crack(cells, bar);
 }
 
-TEST(SlowVerificationCentreCrack, JAtTwentyCells) { check_centre_crack(20.0, 0.01); }
+TEST(SlowVerificationCentreCrack, JAtFortyCells) { check_centre_crack(40.0, 0.005); }
 
-TEST(SlowVerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
+TEST(VerificationCentreCrack, ExplicitAtFiveCells) { check_centre_crack(5.0, 0.04, true); }
+
+TEST(VerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
     for (const double lift : {0.0, 0.5}) {
         for (const double shift : {0.0, 0.25, 0.5, 0.75}) {
             const double error = centre_crack_error(10.0, shift, lift);
@@ -58,60 +74,70 @@ TEST(SlowVerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
 }
 
 TEST(VerificationStrip, GIsTheEnergyFarAhead) {
-    // Strip of half height 5 mm between grips: G = Es eps^2 h whatever the crack length (REFERENCES: strip). Both plane states.
+    // Strip of half height 5 mm between grips: G = Es eps^2 h whatever the crack length (REFERENCES: strip). Both plane states. Ten
+    // cells to a half height; the ends, three heights away, change it by less than 1e-4.
     for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
-        Scene scene = block({60e-3, 10e-3}, 0.5e-3);
-        scene.model.plane = plane;
-        scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
-        scene.edges[0].until = 1e-4;
-        Crack crack;
-        crack.points = {Vec2(0, 5e-3), Vec2(30e-3, 5e-3)};
-        scene.cracks = {crack};
-        scene.measure = {"top", "top"};
-        scene.solver.damping = 4e4;
-        scene.stop.time = 2e-3;
-        Trial run(scene);
-        run.until(2e-3);
-        const double E = 40e6, nu = 0.33, strain = 0.01;
-        const double modulus = plane == PlaneCondition::strain ? E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) : E / (1 - nu * nu);
-        const double G = modulus * strain * strain * 5e-3;
-        const TipLoad load = run.solver.load_at(0, true);
-        std::printf("strip, plane %s: G off by %+.2f %%\n", plane == PlaneCondition::strain ? "strain" : "stress",
-                    100 * (load.G / G - 1));
-        EXPECT_NEAR(load.G, G, 0.02 * G);
-        EXPECT_LT(std::abs(load.K_II), 1e-3 * load.K_I);
+        for (const bool explicitly : {false, true}) {
+            if (explicitly && plane == PlaneCondition::stress) continue;
+            Scene scene = block({60e-3, 10e-3}, 0.5e-3);
+            scene.model.plane = plane;
+            scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.edges[0].until = 1e-4;
+            Crack crack;
+            crack.points = {Vec2(0, 5e-3), Vec2(30e-3, 5e-3)};
+            scene.cracks = {crack};
+            scene.measure = {"top", "top"};
+            scene.solver.damping = 4e4;
+            scene.stop.time = 2e-3;
+            const double E = 40e6, nu = 0.33, strain = 0.01;
+            const double modulus = plane == PlaneCondition::strain ? E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) : E / (1 - nu * nu);
+            const double error = rate_at_rest(scene, explicitly) / (modulus * strain * strain * 5e-3) - 1;
+            std::printf("strip, plane %s%s: G off by %+.2f %%\n", plane == PlaneCondition::strain ? "strain" : "stress",
+                        explicitly ? ", explicit" : "", 100 * error);
+            EXPECT_LT(std::abs(error), 0.02);
+        }
     }
 }
 
-// J at a crack length against the change of strain energy, at held edges, over half a cell to either side.
-double against_energy(double crack_length, double cell, bool rings) {
+// J at a crack length against the change of potential energy, at held edges, over half a cell to either side.
+double against_energy(double crack_length, double cell, bool rings, bool explicitly) {
     double energy[2];
     double J = 0;
     for (int side = 0; side < 3; ++side) {
-        Trial run(ring_specimen(crack_length + (side - 1) * 0.5 * cell, cell, rings));
-        run.until(*run.scene.stop.time);
-        if (side == 1) J = run.solver.load_at(0, true).G;
-        else energy[side / 2] = run.solver.energies().strain;
+        const Scene scene = ring_specimen(crack_length + (side - 1) * 0.5 * cell, cell, rings);
+        if (side == 1) {
+            J = rate_at_rest(scene, explicitly);
+        } else if (explicitly) {
+            Trial run(scene);
+            run.until(*scene.stop.time);
+            energy[side / 2] = run.solver.energies().strain;
+        } else {
+            StaticTrial run(at_equilibrium(scene));
+            EXPECT_TRUE(run.solve(*scene.stop.time));
+            energy[side / 2] = run.equilibrium.potential();
+        }
     }
     return J / ((energy[0] - energy[1]) / cell) - 1.0;
 }
 
 TEST(VerificationEnergy, JIsTheChangeOfEnergyInOneWood) {
-    const double error = against_energy(5e-3, 0.2e-3, false);
-    std::printf("J against change of energy, one wood: %+.2f %%\n", 100 * error);
-    EXPECT_LT(std::abs(error), 0.03);
+    for (const bool explicitly : {false, true}) {
+        const double error = against_energy(5e-3, 0.2e-3, false, explicitly);
+        std::printf("J against change of energy, one wood%s: %+.2f %%\n", explicitly ? ", explicit" : "", 100 * error);
+        EXPECT_LT(std::abs(error), 0.03);
+    }
 }
 
-TEST(SlowVerificationEnergy, JIsTheChangeOfEnergyAmongRings) {
-    for (const double a : {2.5e-3, 3.0e-3, 5.0e-3, 7.0e-3}) {
-        const double error = against_energy(a, 0.1e-3, true);
+TEST(VerificationEnergy, JIsTheChangeOfEnergyAmongRings) {
+    for (const double a : {2.5e-3, 3.0e-3, 5.0e-3, 7.0e-3}) {  // five cells and more from a boundary
+        const double error = against_energy(a, 0.1e-3, true, false);
         std::printf("J against change of energy, rings, a = %.1f mm: %+.2f %%\n", 1e3 * a, 100 * error);
         EXPECT_LT(std::abs(error), 0.03) << a;
     }
 }
 
-TEST(UnitCrackFaces, TouchButDoNotPass) {
-    // Pressed together, a cracked block is as stiff as a whole one.
+TEST(UnitCrackFaces, TouchButDoNotPassInMotion) {
+    // Pressed together, a cracked block is as stiff as a whole one; faces overlap by what their penalty yields.
     double force[2];
     for (const bool cracked : {false, true}) {
         Scene scene = block({10e-3, 10e-3}, 1e-3);
