@@ -25,6 +25,9 @@ constexpr int loading_steps = 32;
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
+// Part by which the change of the potential over a loading step may differ from the load's work by its ends (trapezoid rule).
+constexpr double most_disagreement = 0.1;
+
 // G at the tip over toughness below which a crack is not about to move.
 constexpr double far_below = 0.3;
 
@@ -159,39 +162,59 @@ bool Quasistatic::know_linear(std::size_t number) {
     return true;
 }
 
+// Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
+// asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
+// when a crack has grown at the same time it falls.
+bool Quasistatic::solve_from(double potential, double power, double time) {
+    const double from = equilibrium_.time();
+    ++equilibria_;
+    if (equilibrium_.solve(time) != Equilibrium::Outcome::solved) return false;
+    const double change = equilibrium_.potential() - potential;
+    const double rounding = 1e-6 * std::abs(potential);
+    if (time == from) return change <= rounding;
+    const double added = 0.5 * (power + equilibrium_.power()) * (time - from);
+    return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
+}
+
 // Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
 bool Quasistatic::solve_for(Place& place, int time) {
     enter(place);
-    int from = 0;
-    std::vector<Vec2> start(equilibrium_.displacements().size(), Vec2::Zero());
+    const std::vector<Vec2> unloaded(equilibrium_.displacements().size(), Vec2::Zero());
+    Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
-    for (const auto* known : {&place.displacement, &place.guess}) {
-        for (const auto& [number, displacement] : *known) {
+    for (const auto* all : {&place.known, &place.guess}) {
+        for (const auto& [number, known] : *all) {
             if (std::abs(number - time) >= nearest) continue;
             nearest = std::abs(number - time);
-            from = number;
-            start = displacement;
+            from = known;
         }
     }
     // Two states in a row tell where the third will be.
-    const auto one = place.displacement.find(time - 1);
-    const auto two = place.displacement.find(time - 2);
-    if (nearest == 1 && one != place.displacement.end() && two != place.displacement.end()) {
-        std::vector<Vec2> ahead = one->second;
-        for (std::size_t f = 0; f < ahead.size(); ++f) ahead[f] += one->second[f] - two->second[f];
-        equilibrium_.set_displacements(ahead, time_of(time));
-        ++equilibria_;
-        if (equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved) return true;
+    const auto one = place.known.find(time - 1);
+    const auto two = place.known.find(time - 2);
+    if (nearest == 1 && one != place.known.end() && two != place.known.end()) {
+        std::vector<Vec2> ahead = one->second.displacement;
+        for (std::size_t f = 0; f < ahead.size(); ++f) ahead[f] += one->second.displacement[f] - two->second.displacement[f];
+        equilibrium_.set_displacements(ahead, time_of(time - 1));
+        if (solve_from(one->second.potential, one->second.power, time_of(time))) return true;
     }
-    const int least_parts = std::max(1, std::abs(time - from));
+    const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
-        equilibrium_.set_displacements(start, time_of(from));
+        equilibrium_.set_displacements(from.displacement, time_of(from.time));
+        double potential = from.potential;
+        double power = from.power;
         bool good = true;
         for (int part = 1; part <= parts && good; ++part) {
-            ++equilibria_;
-            good = equilibrium_.solve(std::lerp(time_of(from), time_of(time), static_cast<double>(part) / parts)) == Equilibrium::Outcome::solved;
+            good = solve_from(potential, power, std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            potential = equilibrium_.potential();
+            power = equilibrium_.power();
         }
         if (good) return true;
+        if (from.time == time) {  // not by growth at this load, then: by loading, from a lower one
+            const auto lower = place.known.lower_bound(time);
+            if (lower == place.known.begin()) return false;
+            from = std::prev(lower)->second;
+        }
     }
     return false;
 }
@@ -202,7 +225,7 @@ bool Quasistatic::know(std::size_t number, int time) {
     if (place.station.states.count(time)) return true;
     if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
     if (solve_for(place, time)) {
-        place.displacement[time] = equilibrium_.displacements();
+        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
         keep(number, time, load_state());
         return true;
     }
@@ -244,15 +267,13 @@ bool Quasistatic::extend(double now) {
         time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
         if (!know(places_.size() - 1, time)) return false;
         enter(last);
-        equilibrium_.set_displacements(last.displacement.at(time), time_of(time));
+        equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time));
     }
     const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
     const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));
-    std::map<int, std::vector<Vec2>> guess;
-    for (const auto& [known, displacement] : last.displacement) {
-        guess[known] = displacement;
-        for (const auto& [added, from] : fields) guess[known].push_back(guess[known][from]);
-    }
+    std::map<int, Known> guess = last.known;
+    for (auto& [time_there, known] : guess)
+        for (const auto& [added, from] : fields) known.displacement.push_back(known.displacement[from]);
     add_place();
     places_.back().guess = std::move(guess);
     return !plan_.linear || know_linear(places_.size() - 1);

@@ -51,11 +51,17 @@ class Quasistatic {
     long points() const { return body_.points.count(); }
 
   private:
+    struct Known {                                      // an equilibrium of this grid
+        int time;                                       // its number
+        std::vector<Vec2> displacement;                 // [fields] [m]
+        double potential;                               // [J]
+        double power;                                   // [W]
+    };
     struct Place {
         Station station;
         std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene
-        std::map<int, std::vector<Vec2>> displacement;  // by number of the time
-        std::map<int, std::vector<Vec2>> guess;         // the same of the place before, handed on
+        std::map<int, Known> known;                     // by number of the time
+        std::map<int, Known> guess;                     // the same of the place before, handed on
     };
 
     Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader);
@@ -66,6 +72,7 @@ class Quasistatic {
     bool know(std::size_t number, int time);
     bool know_linear(std::size_t number);
     bool solve_for(Place& place, int time);
+    bool solve_from(double potential, double power, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);
     void enter(const Place& place);

@@ -37,7 +37,8 @@ inline std::vector<Vec2> some_points(std::size_t count) {
     return points;
 }
 
-/// Two cracks, of which the second one is tracked, two reactions with names that no HDF5 path could hold, two frames.
+/// Two cracks, of which the second one is tracked, two reactions with names that no HDF5 path could hold, places that it
+/// moves on from, two frames.
 inline Record full_record() {
     Record record;
     record.status = RunStatus::split;
@@ -59,6 +60,13 @@ inline Record full_record() {
     }
     record.cracks = {crack};
     record.reactions = {{"left/right wheel", some_points(record.series.size())}, {"Auflager ä", crack.tip}};
+    for (const double number : awkward_numbers()) {
+        CriticalLoad place;
+        for (const DrivingColumn& column : driving_columns)
+            place.*column.value = number;
+        place.tip = {-number, number};
+        record.driving.push_back(place);
+    }
     record.point_position = some_points(5000);
     record.point_latewood.assign(5000, 0.25f);
     for (int i = 0; i < 2; ++i) {

@@ -58,6 +58,12 @@ TEST(UnitHdf5, RecordComesBackBitForBit) {
         EXPECT_EQ(after.reactions[i].name, before.reactions[i].name);
         EXPECT_TRUE(same_bits(after.reactions[i].force, before.reactions[i].force));
     }
+    ASSERT_EQ(after.driving.size(), awkward_numbers().size());
+    for (std::size_t i = 0; i < before.driving.size(); ++i) {
+        EXPECT_TRUE(same_bits(std::vector{after.driving[i].tip}, std::vector{before.driving[i].tip}));
+        for (const DrivingColumn& column : driving_columns)
+            EXPECT_TRUE(same_bits(after.driving[i].*column.value, before.driving[i].*column.value)) << column.name;
+    }
     EXPECT_TRUE(same_bits(after.point_position, before.point_position));
     EXPECT_TRUE(same_bits(after.point_latewood, before.point_latewood));
     ASSERT_EQ(after.frames.size(), 2u);
@@ -142,7 +148,7 @@ TEST(UnitHdf5, WhatIsEmptyComesBackEmpty) {
     write(Record{}, folder / "record.h5");
     const Record record = read_record(folder / "record.h5");
     EXPECT_TRUE(record.series.empty() && record.paths.empty() && record.cracks.empty() && record.reactions.empty() &&
-                record.point_position.empty() && record.frames.empty() && record.scene_text.empty());
+                record.driving.empty() && record.point_position.empty() && record.frames.empty() && record.scene_text.empty());
 
     write(Fit{}, folder / "fit.h5");
     const Fit fit = read_fit(folder / "fit.h5");

@@ -160,6 +160,21 @@ TEST(UnitScene, Defaults) {
     EXPECT_EQ(cracked.cracks[0].faces.kind, CrackFaces::Kind::frictionless);
 }
 
+// Two grids unless one is asked for.
+TEST(UnitScene, Extrapolate) {
+    const SceneFolder folder;
+    const auto with = [](const std::string& value) { return plain_scene + "\n[solver]\nextrapolate = " + value + "\n"; };
+    EXPECT_TRUE(folder.parse(plain_scene).solver.extrapolate);
+    EXPECT_TRUE(folder.parse(with("true")).solver.extrapolate);
+    EXPECT_FALSE(folder.parse(with("false")).solver.extrapolate);
+    EXPECT_FALSE(folder.parse(plain_scene, {{"solver.extrapolate", "false"}}).solver.extrapolate);
+    const std::string file = (folder / "scene.toml").string();
+    expect_error(file, "solver.extrapolate", "", [&] { folder.parse(with("1")); });
+    expect_error(file, "solver.extrapolate", "", [&] { folder.parse(with("\"yes\"")); });
+    expect_error(file, "solver.extrapolat", "did you mean \"extrapolate\"?",
+                 [&] { folder.parse(plain_scene + "\n[solver]\nextrapolat = true\n"); });
+}
+
 TEST(UnitScene, FileOnDisk) {
     const SceneFolder folder;
     EXPECT_EQ(read_scene(folder.write("windows.toml", "\xEF\xBB\xBF" + plain_scene)).edges.size(), 2U);

@@ -46,6 +46,13 @@ Record small_record() {
     record.paths = {{{0.01, 0.005}, {0.0075, 0.005}}, {{0, 0}, {1, 1}}};
     record.cracks = {{{0, 0.25}, {{0, 0}, {1, 2}}, {0, 3}, {0, 4}, {0, 5}}};
     record.reactions = {{"top", {{0, 0}, {1, 2}}}, {"left, wheel", {{0, 0}, {-3, 4}}}};
+    record.driving = {{.crack_length = 0.25, .tip = {0.5, 0}, .displacement = 1e-6, .force = -2.5, .G = 90, .toughness = 100},
+                      {.crack_length = 1.0 / 3.0,
+                       .tip = {0.75, -1},
+                       .displacement = std::numeric_limits<double>::infinity(),
+                       .force = 0,
+                       .G = 0,
+                       .toughness = 125}};
     return record;
 }
 
@@ -105,6 +112,18 @@ TEST(UnitTables, Reactions) {
               "1e-06,1,2,-3,4\n");
 }
 
+// The load at which the crack moves on from each place, also from those that it jumps over.
+TEST(UnitTables, Driving) {
+    const TemporaryFolder folder;
+    write(small_record(), folder / "record.h5");
+    EXPECT_EQ(table(folder / "record.h5", "driving"),
+              "tip_x_m,tip_y_m,crack_length_m,displacement_m,force_N,G_J_m2,toughness_J_m2\n"
+              "0.5,0,0.25,1e-06,-2.5,90,100\n"
+              "0.75,-1,0.3333333333333333,inf,0,0,125\n");
+    write(Record{}, folder / "explicit.h5");
+    EXPECT_EQ(table(folder / "explicit.h5", "driving"), "tip_x_m,tip_y_m,crack_length_m,displacement_m,force_N,G_J_m2,toughness_J_m2\n");
+}
+
 // A quote in a field is doubled (RFC 4180, section 2, rule 7).
 TEST(UnitTables, Parameters) {
     const TemporaryFolder folder;
@@ -130,7 +149,7 @@ TEST(UnitTables, RunsResidualsCorrelation) {
 TEST(UnitTables, UnknownTableListsThoseThatThereAre) {
     const TemporaryFolder folder;
     write(small_record(), folder / "record.h5");
-    EXPECT_EQ(refusal(folder / "record.h5", "serie"), "must be one of: series, path, crack1, path1, reactions");
+    EXPECT_EQ(refusal(folder / "record.h5", "serie"), "must be one of: series, path, crack1, path1, driving, reactions");
     write(small_fit(), folder / "fit.h5");
     EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation");
     Specimen specimen;
