@@ -14,6 +14,10 @@ constexpr double search_margin = 2.0;  // in cells; parts move by far less betwe
 // time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
 constexpr double stiffness_in_cells = 10.0;
 
+// Over twice this depth, in cells, contact sets in: the force grows with its square there, so that Newton's method sees a touch
+// coming; from there on it grows evenly.
+constexpr double onset_in_cells = 0.01;
+
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
     curvature = 0.0;
@@ -93,11 +97,25 @@ double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
 
 std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {
     if (age_++ % steps_between_searches_ == 0) find_near(moved, displacement);
+    const double onset = onset_in_cells * body_.layout.cell.minCoeff();
     std::vector<Touch> found;
     for (const int i : near_) {
-        Touch touch{i, stiffness_[i], 0.0, Vec2::Zero(), 0.0};
-        if (depth_in(shape_, current(body_.facets[i], displacement) - moved, touch.depth, touch.normal, touch.curvature))
-            found.push_back(touch);
+        Touch touch{i, Vec2::Zero(), 0.0, 0.0, 0.0, 0.0};
+        double depth = 0.0;
+        const Vec2 x = current(body_.facets[i], displacement) - moved;
+        if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) continue;
+        const double k = stiffness_[i];
+        if (depth < 2.0 * onset) {
+            touch.force = k * depth * depth / (4.0 * onset);
+            touch.stiffness = k * depth / (2.0 * onset);
+            touch.energy = touch.force * depth / 3.0;
+        } else {
+            const double d = depth - onset;
+            touch.force = k * d;
+            touch.stiffness = k;
+            touch.energy = 0.5 * k * d * d + k * onset * onset / 6.0;
+        }
+        found.push_back(touch);
     }
     return found;
 }
@@ -107,10 +125,10 @@ Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement,
     stored_energy_ = 0.0;
     for (const Touch& touch : touches(moved, displacement)) {
         const Facet& facet = body_.facets[touch.facet];
-        const Vec2 push = touch.stiffness * touch.depth * touch.normal;
+        const Vec2 push = touch.force * touch.normal;
         for (int k = 0; k < 4; ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
         total += push;
-        stored_energy_ += 0.5 * touch.stiffness * touch.depth * touch.depth;
+        stored_energy_ += touch.energy;
     }
     return total;
 }

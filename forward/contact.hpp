@@ -19,13 +19,14 @@ class SlidingBody {
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].
     Vec2 push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
 
-    /// A facet that the body pushes on: with d the depth of its middle, the energy is 1/2 stiffness d^2.
+    /// A facet that the body pushes on.
     struct Touch {
         int facet;
-        double stiffness;  // [N/m]
-        double depth;      // [m]
-        Vec2 normal;       // unit, out of the body: gradient of -d
+        Vec2 normal;       // unit, out of the body
         double curvature;  // of the surfaces of equal depth there, 1 / radius [1/m]
+        double force;      // along the normal [N]
+        double stiffness;  // force per depth [N/m]
+        double energy;     // [J]
     };
 
     /// All facets that the body, gone so far, pushes on.

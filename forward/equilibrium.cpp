@@ -21,6 +21,10 @@ constexpr double face_stiffness_factor = 100.0;
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node.
 constexpr double balance = 1e-7;
 constexpr int most_iterations = 60;
+// Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below, against
+// 1e-3 of a held one.
+constexpr double least_reciprocal_condition = 1e-10;
+
 // An old tangent goes on as long as it makes the forces out of balance smaller by this: four such steps cost as much as a new one.
 constexpr double worth_keeping = 0.25;
 constexpr int most_trials = 12;  // of a part of a Newton step
@@ -179,21 +183,29 @@ bool Equilibrium::factor_tangent(bool geometric) {
     for (const FieldPair& pair : cracks_.pairs)
         if (mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0) add_pair(pair, pair_stiffness(pair));
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
-        for (const SlidingBody::Touch& touch : sliding_[i].touches(boundary_.travel(sliding_driver_[i], time_), displacement_)) {
+        const Vec2 gone = boundary_.travel(sliding_driver_[i], time_);
+        const Vec2 still_to_go = boundary_.travel(sliding_driver_[i], next_time_) - gone;
+        for (const SlidingBody::Touch& touch : sliding_[i].touches(gone, displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const Mat2 along = touch.normal * touch.normal.transpose();
-            const double turning = geometric ? touch.depth * touch.curvature : 0.0;
-            const Mat2 stiffness = touch.stiffness * (along - turning * (Mat2::Identity() - along));
+            const double turning = geometric ? touch.force * touch.curvature : 0.0;
+            const Mat2 stiffness = touch.stiffness * along - turning * (Mat2::Identity() - along);
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
             add_tangent(points.node[facet.point], tangent);
+            const Vec2 push = stiffness * still_to_go;  // that the body's way adds, if what it touches stays the same
+            for (int k = 0; k < 4; ++k)
+                for (int axis = 0; axis < 2; ++axis) {
+                    const int row = equation_[2 * points.node[facet.point][k] + axis];
+                    if (row >= 0) step_load_[row] += facet.weight[k] * push[axis];
+                }
         }
     }
     Eigen::SparseMatrix<double> matrix(equations_, equations_);
     matrix.setFromTriplets(entries_.begin(), entries_.end());
     ++factorisations_;
-    const bool good = factor_.factor(matrix, new_pattern_);
+    const bool good = factor_.factor(matrix, new_pattern_) && factor_.reciprocal_condition() > least_reciprocal_condition;
     new_pattern_ = false;
     return good;
 }
@@ -211,7 +223,7 @@ void Equilibrium::prescribe(double time) {
     for (const Boundary::Held& held : boundary_.held)
         prescribed_step_[2 * held.field + held.axis] =
             boundary_.travel(held.driver, time)[held.axis] - displacement_[held.field][held.axis];
-    time_ = time;
+    next_time_ = time;
 }
 
 // Slope of the potential along a step of the equations' unknowns [J].
@@ -251,7 +263,7 @@ void Equilibrium::take_step(const Eigen::VectorXd& step) {
 Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
     bool renew = true;
-    double residual = std::numeric_limits<double>::infinity();
+    double residual = 0.0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
@@ -261,8 +273,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
             if (equation_[dof] >= 0) right[equation_[dof]] += force_[dof / 2][dof % 2];
         const Eigen::VectorXd step = factor_.solve(right);
-        const bool moves_boundary = std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
-        if (moves_boundary) {
+        const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
+        if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
+            time_ = time;
             for (std::size_t dof = 0; dof < equation_.size(); ++dof) displacement_[dof / 2][dof % 2] += prescribed_step_[dof];
             std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
             move(step, 1.0);
@@ -322,7 +335,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     body_.points.node = snapshot.node;
     boundary_.held = snapshot.held;
     displacement_ = snapshot.displacement;
-    time_ = snapshot.time;
+    time_ = next_time_ = snapshot.time;
     internal_force_.sort_cells();
     renumber();
     find_forces();
@@ -330,7 +343,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
 
 void Equilibrium::set_displacements(const std::vector<Vec2>& displacement, double time) {
     displacement_ = displacement;
-    time_ = time;
+    time_ = next_time_ = time;
     find_forces();
 }
 

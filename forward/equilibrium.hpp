@@ -89,6 +89,7 @@ class Equilibrium {
     double contact_energy_ = 0;       // [J]
     double face_energy_ = 0;          // [J]
     double time_ = 0;                 // [s]
+    double next_time_ = 0;            // that is being solved for [s]
 
     std::vector<int> node_order_;     // [nodes] place in the elimination
     std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points

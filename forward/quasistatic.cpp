@@ -189,21 +189,17 @@ bool Quasistatic::solve_for(Place& place, int time) {
             from = known;
         }
     }
-    // Two states in a row tell where the third will be.
-    const auto one = place.known.find(time - 1);
-    const auto two = place.known.find(time - 2);
-    if (nearest == 1 && one != place.known.end() && two != place.known.end()) {
-        std::vector<Vec2> ahead = one->second.displacement;
-        for (std::size_t f = 0; f < ahead.size(); ++f) ahead[f] += one->second.displacement[f] - two->second.displacement[f];
-        equilibrium_.set_displacements(ahead, time_of(time - 1));
-        if (solve_from(one->second.potential, one->second.power, time_of(time))) return true;
-    }
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time));
         double potential = from.potential;
         double power = from.power;
         bool good = true;
+        if (from.time != time && !place.known.count(from.time) && std::isfinite(from.potential)) {  // growth first, then more load
+            good = solve_from(potential, power, time_of(from.time));
+            potential = equilibrium_.potential();
+            power = equilibrium_.power();
+        }
         for (int part = 1; part <= parts && good; ++part) {
             good = solve_from(potential, power, std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
             potential = equilibrium_.potential();

@@ -121,7 +121,8 @@ TEST(UnitTables, Driving) {
               "0.5,0,0.25,1e-06,-2.5,90,100\n"
               "0.75,-1,0.3333333333333333,inf,0,0,125\n");
     write(Record{}, folder / "explicit.h5");
-    EXPECT_EQ(table(folder / "explicit.h5", "driving"), "tip_x_m,tip_y_m,crack_length_m,displacement_m,force_N,G_J_m2,toughness_J_m2\n");
+    EXPECT_EQ(table(folder / "explicit.h5", "driving"),
+              "tip_x_m,tip_y_m,crack_length_m,displacement_m,force_N,G_J_m2,toughness_J_m2\n");
 }
 
 // A quote in a field is doubled (RFC 4180, section 2, rule 7).

@@ -63,8 +63,8 @@ TEST(UnitElasticity, StressIsTheSlopeOfTheEnergyAndTheTangentThatOfTheStress) {
             }
             EXPECT_LT((tangent - tangent.transpose()).norm(), 1e-12 * tangent.norm());
         }
-        std::printf("%s: stress off by %.1e, tangent by %.1e of some 10 Pa\n", rotates ? "finite rotation" : "small strain", worst_stress,
-                    worst_tangent);
+        std::printf("%s: stress off by %.1e, tangent by %.1e of some 10 Pa\n", rotates ? "finite rotation" : "small strain",
+                    worst_stress, worst_tangent);
         EXPECT_LT(worst_stress, 1e-8);
         EXPECT_LT(worst_tangent, 1e-8);
     }
@@ -97,13 +97,15 @@ TEST(UnitElasticity, WithoutItsGeometricPartTheTangentIsNeverNegative) {
     }
     EXPECT_TRUE(whole_was_negative) << "this test says nothing";
     // Without stress there is no such part.
-    EXPECT_LT((elastic_tangent(turn(1.0) - Mat2::Identity(), C, true, false) - elastic_tangent(turn(1.0) - Mat2::Identity(), C, true)).norm(),
-              1e-13 * C.norm());
+    EXPECT_LT(
+        (elastic_tangent(turn(1.0) - Mat2::Identity(), C, true, false) - elastic_tangent(turn(1.0) - Mat2::Identity(), C, true))
+            .norm(),
+        1e-13 * C.norm());
 }
 
 TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
-    // Cells far from a crack go side by side, cells next to it point by point: both must agree with one energy. The step is 1e-6 of a
-    // cell: truncation 1e-12, rounding 1e-9 of the force.
+    // Cells far from a crack go side by side, cells next to it point by point: both must agree with one energy. The step is 1e-6
+    // of a cell: truncation 1e-12, rounding 1e-9 of the force.
     Scene scene = block({6e-3, 6e-3}, 1e-3);
     Crack crack;
     crack.points = {Vec2(0, 3.3e-3), Vec2(2.6e-3, 3.1e-3)};
@@ -131,7 +133,8 @@ TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
                 worst = std::max(worst, std::abs(slope + force[f][axis]));
             }
         }
-        std::printf("internal force, %s: off by %.1e of the largest\n", rotates ? "finite rotation" : "small strain", worst / largest);
+        std::printf("internal force, %s: off by %.1e of the largest\n", rotates ? "finite rotation" : "small strain",
+                    worst / largest);
         EXPECT_LT(worst, 1e-7 * largest);
     }
 }
@@ -245,13 +248,13 @@ std::array<double, 3> shares_of_a_cell(double poisson_ratio, double lift) {
 }
 
 TEST(UnitTies, EnergyGoesLinearlyWithTheTip) {
-    // A ripple of a few hundredths of what a cell gives off is what one compliance for all woods leaves (forward/cracks.cpp). Asked
-    // 0.03; nearly incompressible material misses that, above all with the crack between two rows of nodes.
+    // A ripple of a few hundredths of what a cell gives off is what one compliance for all woods leaves (forward/cracks.cpp).
+    // Asked 0.03; nearly incompressible material misses that, above all with the crack between two rows of nodes.
     for (const auto& [poisson_ratio, bar] : {std::pair{0.0, 0.035}, {0.2, 0.03}, {0.33, 0.03}, {0.45, 0.065}}) {
         for (const double lift : {0.0, 0.25, 0.5}) {
             const auto share = shares_of_a_cell(poisson_ratio, lift);
-            std::printf("nu %.2f, crack %.2f of a cell above nodes: share given off %.3f %.3f %.3f\n", poisson_ratio, lift, share[0],
-                        share[1], share[2]);
+            std::printf("nu %.2f, crack %.2f of a cell above nodes: share given off %.3f %.3f %.3f\n", poisson_ratio, lift,
+                        share[0], share[1], share[2]);
             for (int k = 0; k < 3; ++k) EXPECT_NEAR(share[k], 0.25 * (k + 1), bar) << poisson_ratio << " " << lift;
         }
     }
@@ -321,8 +324,8 @@ TEST(UnitEquilibrium, RigidRotationGivesNoStress) {
 }
 
 TEST(UnitEquilibrium, PowerIsTheSlopeOfThePotential) {
-    // At equilibrium dPi/dt is the power of what prescribes motion: with a wheel that slides on a flank, and rotation. Steps of 1e-3
-    // of the loading: truncation 1e-6.
+    // At equilibrium dPi/dt is the power of what prescribes motion: with a wheel that slides on a flank, and rotation. Steps of
+    // 1e-3 of the loading: truncation 1e-6.
     Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.5e-3));
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     scene.specimen.cutouts = {Polygon{{Vec2(3.5e-3, 10e-3), Vec2(6.5e-3, 10e-3), Vec2(5e-3, 7e-3)}}};
@@ -344,7 +347,8 @@ TEST(UnitEquilibrium, PowerIsTheSlopeOfThePotential) {
     }
     ASSERT_TRUE(run.solve(0.3));
     const double slope = (potential[1] - potential[0]) / 2e-3;
-    std::printf("power %.6g W, slope of the potential off by %+.1e\n", run.equilibrium.power(), slope / run.equilibrium.power() - 1);
+    std::printf("power %.6g W, slope of the potential off by %+.1e\n", run.equilibrium.power(),
+                slope / run.equilibrium.power() - 1);
     EXPECT_NEAR(slope, run.equilibrium.power(), 1e-3 * std::abs(run.equilibrium.power()));
 }
 
@@ -407,8 +411,8 @@ TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
         const Vec2 moved(0.2e-4, -1e-4);
         const double sticks = stiffness_of_cracked(moved, CrackFaces::Kind::stick, y).x();
         const double slides = stiffness_of_cracked(moved, CrackFaces::Kind::frictionless, y).x();
-        std::printf("pressed and sheared, y = %.1f mm: shear force of stuck faces %.5f of a whole block's, of free ones %.3f\n", 1e3 * y,
-                    sticks, slides);
+        std::printf("pressed and sheared, y = %.1f mm: shear force of stuck faces %.5f of a whole block's, of free ones %.3f\n",
+                    1e3 * y, sticks, slides);
         EXPECT_NEAR(sticks, 1.0, 2e-3);
         EXPECT_LT(slides, 0.95);
     }

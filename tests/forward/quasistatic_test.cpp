@@ -70,8 +70,8 @@ TEST(VerificationWalk, AStripCracksAtTheExactDisplacement) {
         const double exact = critical_of_strip(nu, 100.0);
         ASSERT_FALSE(record.driving.empty());
         const double first = record.driving.front().displacement;
-        std::printf("strip, nu = %.2f: cracks at %.5f mm, exact %.5f mm (%+.2f %%), ends %s at %.5f mm\n", nu, 1e3 * first, 1e3 * exact,
-                    100 * (first / exact - 1), name(record.status), 1e3 * record.series.back().displacement);
+        std::printf("strip, nu = %.2f: cracks at %.5f mm, exact %.5f mm (%+.2f %%), ends %s at %.5f mm\n", nu, 1e3 * first,
+                    1e3 * exact, 100 * (first / exact - 1), name(record.status), 1e3 * record.series.back().displacement);
         EXPECT_NEAR(first, exact, 0.01 * exact);  // five cells to a half height
         // G does not depend on a while the tip is three heights and more from the free end.
         for (const CriticalLoad& place : record.driving) {
@@ -80,8 +80,8 @@ TEST(VerificationWalk, AStripCracksAtTheExactDisplacement) {
             }
         }
         EXPECT_EQ(record.status, RunStatus::split);
-        // With nu = 0 the free end does not feel the pull: nothing on the way needs more load, and the crack runs through at once.
-        // Else the wood at the free end, which can yield to the side, is strained less: the crack stops short of it.
+        // With nu = 0 the free end does not feel the pull: nothing on the way needs more load, and the crack runs through at
+        // once. Else the wood at the free end, which can yield to the side, is strained less: the crack stops short of it.
         if (nu == 0.0) {
             EXPECT_NEAR(record.series.back().displacement, first, 1e-3 * first);
         } else {
@@ -169,13 +169,15 @@ TEST(VerificationWalk, EnergyBalancesWhereTheCrackGrowsSteadily) {
         double unspent = 0;
         for (std::size_t i = 1; i < record.driving.size(); ++i) {
             const CriticalLoad &a = record.driving[i - 1], &b = record.driving[i];
-            if (b.crack_length < 35e-3 * (1 + 1e-9)) unspent += 0.5 * (a.G + b.G - 2 * brittle) * (b.crack_length - a.crack_length);
+            if (b.crack_length < 35e-3 * (1 + 1e-9))
+                unspent += 0.5 * (a.G + b.G - 2 * brittle) * (b.crack_length - a.crack_length);
         }
         const double missing = end.external_work - end.strain_energy - end.fracture_energy;
-        std::printf("cantilevers, advance %.1f mm: work %.4e J, strain %.4e J, fracture %.4e J, imbalance %.1e; not spent %.1e J, by "
-                    "the driving curve %.1e J\n",
-                    1e3 * advance, end.external_work, end.strain_energy, end.fracture_energy, record.worst_energy_imbalance, missing,
-                    unspent);
+        std::printf(
+            "cantilevers, advance %.1f mm: work %.4e J, strain %.4e J, fracture %.4e J, imbalance %.1e; not spent %.1e J, by "
+            "the driving curve %.1e J\n",
+            1e3 * advance, end.external_work, end.strain_energy, end.fracture_energy, record.worst_energy_imbalance, missing,
+            unspent);
         EXPECT_NEAR(missing, unspent, 0.002 * end.external_work);
         if (advance == 0.0) {
             EXPECT_LT(record.worst_energy_imbalance, 0.002);
@@ -210,7 +212,8 @@ double driving_at(const Record& record, double length) {
 }
 
 bool is_jump(const Instant& before, const Instant& after) {
-    return after.crack_length > before.crack_length * (1 + 1e-9) && after.displacement - before.displacement < 1e-7 * after.displacement;
+    return after.crack_length > before.crack_length * (1 + 1e-9) &&
+           after.displacement - before.displacement < 1e-7 * after.displacement;
 }
 
 TEST(VerificationWalk, RingsStopTheCrackAndLetItJump) {
@@ -246,8 +249,8 @@ TEST(VerificationWalk, RingsStopTheCrackAndLetItJump) {
         if (row.crack_length > 3.6e-3 * (1 + 1e-9) && row.crack_length < record.driving.back().crack_length) {
             EXPECT_LE(driving_at(record, row.crack_length), row.displacement * (1 + 1e-6)) << row.crack_length;
         }
-    std::printf("rings: %s, %zu rows, %ld equilibria, %.2f s, imbalance %.1e\n", name(record.status), record.series.size(), record.steps,
-                record.seconds, record.worst_energy_imbalance);
+    std::printf("rings: %s, %zu rows, %ld equilibria, %.2f s, imbalance %.1e\n", name(record.status), record.series.size(),
+                record.steps, record.seconds, record.worst_energy_imbalance);
 }
 
 TEST(UnitWalk, RowsAreAtEvenTimesAndWhereSomethingHappens) {
@@ -268,10 +271,9 @@ TEST(UnitWalk, RowsAreAtEvenTimesAndWhereSomethingHappens) {
 
 TEST(UnitWalk, StopsAreMetExactly) {
     // The last row is where the condition is met, to rounding, whether the crack stands, grows or jumps there; and a run that is
-    // stopped on the way went the same way as the whole one. A kept walk saves the equilibria.
+    // stopped on the way went the same way as the whole one.
     const Scene scene = rings_walk();
-    KeptWalk walk(scene);
-    const Record whole = walk.run(scene, {});
+    const Record whole = simulate(scene);
     const auto stopped = [&](auto change) {
         Scene other = scene;
         change(other.stop);
@@ -279,12 +281,10 @@ TEST(UnitWalk, StopsAreMetExactly) {
         EXPECT_EQ(record.status, RunStatus::finished);
         return record.series.back();
     };
-    for (const double u : {0.03e-3, 0.17e-3}) {
+    for (const double u : {0.03e-3, 0.17e-3})
         EXPECT_NEAR(stopped([&](Stop& s) { s.displacement = u; }).displacement, u, 1e-6 * u);
-        const double t = u / mm_per_minute;
-        EXPECT_NEAR(stopped([&](Stop& s) { s.time = t; }).time, t, 1e-6 * t);
-    }
-    for (const double a : {4.03e-3, 4.97e-3, 6.5e-3, 9.04e-3}) {  // jumps, grows, jumps, runs through
+    for (const double t : {1.7, 9.1}) EXPECT_NEAR(stopped([&](Stop& s) { s.time = t; }).time, t, 1e-6 * t);
+    for (const double a : {4.03e-3, 4.97e-3, 6.5e-3}) {  // jumps, grows, jumps
         const Instant last = stopped([&](Stop& s) { s.crack_length = a; });
         EXPECT_NEAR(last.crack_length, a, 1e-6 * a);
         const double there = displacement_at_length(whole, a);
@@ -293,8 +293,8 @@ TEST(UnitWalk, StopsAreMetExactly) {
 }
 
 TEST(UnitWalk, ACrackLengthAloneStopsIt) {
-    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; by grips in one that is
-    // not, since nothing says beforehand how far they will go.
+    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; by grips in one that
+    // is not, since nothing says beforehand how far they will go.
     for (const bool grips : {false, true}) {
         Scene bounded = rings_walk();
         bounded.materials["LW"].toughness = 100.0;
@@ -318,36 +318,38 @@ TEST(UnitWalk, ACrackLengthAloneStopsIt) {
         EXPECT_NEAR(without.series.back().crack_length, 3.7e-3, 1e-6 * 3.7e-3)
             << (grips ? "grips" : "edges") << ", says: " << without.message;
         // Finite rotation against small strain, at a strain of a hundredth.
-        EXPECT_NEAR(without.series.back().displacement, with.series.back().displacement, 0.01 * with.series.back().displacement) << grips;
+        EXPECT_NEAR(without.series.back().displacement, with.series.back().displacement, 0.01 * with.series.back().displacement)
+            << grips;
     }
 }
 
 TEST(UnitWalk, LoadGoesWithTheRootOfToughness) {
     // G goes with the square of the load at given crack length: all toughnesses times s, all critical loads times sqrt(s).
-    const Scene scene = rings_walk();
+    Scene scene = rings_walk();
+    scene.stop.crack_length = 5e-3;
     const Record one = simulate(scene);
-    for (const double factor : {1.7}) {
-        Scene tougher = scene;
-        for (auto& [wood, material] : tougher.materials) material.toughness *= factor;
-        const Record other = simulate(tougher);
-        ASSERT_EQ(other.driving.size(), one.driving.size());
-        double worst = 0;
-        for (std::size_t i = 0; i < one.driving.size(); ++i) {
-            EXPECT_EQ(other.driving[i].crack_length, one.driving[i].crack_length);
-            worst = std::max(worst, std::abs(other.driving[i].displacement / (std::sqrt(factor) * one.driving[i].displacement) - 1));
-            worst = std::max(worst, std::abs(other.driving[i].force / (std::sqrt(factor) * one.driving[i].force) - 1));
-        }
-        std::printf("toughness times %.1f: critical displacements and forces off the root by %.1e\n", factor, worst);
-        EXPECT_LT(worst, 1e-9);
+    const double factor = 1.7;
+    Scene tougher = scene;
+    for (auto& [wood, material] : tougher.materials) material.toughness *= factor;
+    const Record other = simulate(tougher);
+    ASSERT_EQ(other.driving.size(), one.driving.size());
+    ASSERT_GT(one.driving.size(), 10u);
+    double worst = 0;
+    for (std::size_t i = 0; i < one.driving.size(); ++i) {
+        EXPECT_EQ(other.driving[i].crack_length, one.driving[i].crack_length);
+        worst = std::max(worst, std::abs(other.driving[i].displacement / (std::sqrt(factor) * one.driving[i].displacement) - 1));
+        worst = std::max(worst, std::abs(other.driving[i].force / (std::sqrt(factor) * one.driving[i].force) - 1));
     }
+    std::printf("toughness times %.1f: critical displacements and forces off the root by %.1e\n", factor, worst);
+    EXPECT_LT(worst, 1e-9);  // the same equilibria to the bit: rounding of the root only
 }
 
 // ---- gradients: what a fit sees of toughness
 
 TEST(GradientWalk, OutputsMoveWithToughness) {
     // Twenty steps of 0.2 % in the toughness of one wood: no difference of neighbouring steps is zero and none is far from the
-    // others, so there is no plateau and no jump. Arrivals go with the root of the toughness of the wood that holds the crack up, half
-    // the relative change; forces on the way go through stations that stand a tenth of a millimetre apart.
+    // others, so there is no plateau and no jump. Arrivals go with the root of the toughness of the wood that holds the crack up,
+    // half the relative change; forces on the way go through stations that stand a tenth of a millimetre apart.
     const Scene scene = rings_walk();
     KeptWalk walk(scene);
     ASSERT_TRUE(walk.reusable());
@@ -365,7 +367,8 @@ TEST(GradientWalk, OutputsMoveWithToughness) {
     const auto check = [&](const char* what, const std::vector<Record>& records, auto value, double most_allowed) {
         double least = INFINITY, most = 0;
         for (int k = 0; k < steps; ++k) {
-            const double slope = std::log(value(records[k + 1]) / value(records[k])) / std::log((1 + step * (k + 1)) / (1 + step * k));
+            const double slope =
+                std::log(value(records[k + 1]) / value(records[k])) / std::log((1 + step * (k + 1)) / (1 + step * k));
             least = std::min(least, slope);
             most = std::max(most, std::abs(slope));
         }
@@ -377,8 +380,12 @@ TEST(GradientWalk, OutputsMoveWithToughness) {
     const auto earlywood = run("EW"), latewood = run("LW");
     check("latewood, jump from the start", latewood, [](const Record& r) { return displacement_at_length(r, 4.0e-3); }, 0.501);
     check("earlywood, arrival at 4.95 mm", earlywood, [](const Record& r) { return displacement_at_length(r, 4.95e-3); }, 0.501);
-    check("earlywood, arrival at 6.5 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 6.5e-3); }, 0.501);
-    check("earlywood, arrival at 9.0 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 9.0e-3); }, 0.501);
+    check(
+        "earlywood, arrival at 6.5 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 6.5e-3); },
+        0.501);
+    check(
+        "earlywood, arrival at 9.0 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 9.0e-3); },
+        0.501);
     check("earlywood, force at 0.14 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.14e-3); }, 1.0);
     check("earlywood, force at 0.18 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.18e-3); }, 1.0);
 }
@@ -389,7 +396,8 @@ bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; 
 
 TEST(UnitKeptWalk, OtherToughnessesAsIfRunAlone) {
     // Linear, straight crack: the same equilibria, so the same bits.
-    const Scene scene = rings_walk();
+    Scene scene = rings_walk();
+    scene.stop.crack_length = 6e-3;
     KeptWalk walk(scene);
     ASSERT_TRUE(walk.reusable());
     const long first = walk.run(scene, {}).steps;
@@ -410,7 +418,8 @@ TEST(UnitKeptWalk, OtherToughnessesAsIfRunAlone) {
         }
         EXPECT_TRUE(same);
         ASSERT_EQ(kept.driving.size(), alone.driving.size());
-        for (std::size_t i = 0; i < kept.driving.size(); ++i) EXPECT_TRUE(same_bits(kept.driving[i].displacement, alone.driving[i].displacement));
+        for (std::size_t i = 0; i < kept.driving.size(); ++i)
+            EXPECT_TRUE(same_bits(kept.driving[i].displacement, alone.driving[i].displacement));
         std::printf("kept walk: %ld equilibria the first time, then %ld (alone %ld)\n", first, kept.steps, alone.steps);
         EXPECT_LE(kept.steps, alone.steps / 4);
     }
@@ -428,8 +437,9 @@ Scene stretched() {
 }
 
 TEST(UnitKeptWalk, OtherToughnessesWithFiniteRotation) {
-    // Between the even times of the loading both interpolate in the same equilibria, found by Newton's method from other starts. A fit
-    // that takes differences makes small steps, and needs hardly any equilibria; farther off, other times of the loading are needed.
+    // Between the even times of the loading both interpolate in the same equilibria, found by Newton's method from other starts.
+    // A fit that takes differences makes small steps, and needs hardly any equilibria; farther off, other times of the loading
+    // are needed.
     const Scene scene = stretched();
     ASSERT_NE(explain(scene).find("Newton"), std::string::npos);
     KeptWalk walk(scene);
@@ -448,8 +458,8 @@ TEST(UnitKeptWalk, OtherToughnessesWithFiniteRotation) {
             worst = std::max({worst, std::abs(a.displacement - b.displacement) / end.displacement,
                               std::abs(a.crack_length / b.crack_length - 1), std::abs(a.force - b.force) / largest_force});
         }
-        std::printf("kept walk, finite rotation, toughness %.0f: off by %.1e; %ld equilibria, alone %ld\n", toughness, worst, kept.steps,
-                    alone.steps);
+        std::printf("kept walk, finite rotation, toughness %.0f: off by %.1e; %ld equilibria, alone %ld\n", toughness, worst,
+                    kept.steps, alone.steps);
         EXPECT_LT(worst, 1e-6);
         if (toughness > 790.0) {
             EXPECT_LT(kept.steps, alone.steps / 4);

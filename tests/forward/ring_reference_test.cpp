@@ -1,6 +1,6 @@
-// The ring specimen against an independent finite-element code (shared/data/ring_reference.csv). Its figures are good to 1e-4 in the
-// reaction and 3e-4 in G. Asked of cells of 0.1 mm, in rows whose tip is three cells and more from a boundary: reaction to 0.5 %, G to
-// 1 %. Where that is missed the gate stands at what is reached, and says so.
+// The ring specimen against an independent finite-element code (shared/data/ring_reference.csv). Its figures are good to 1e-4 in
+// the reaction and 3e-4 in G. Asked of cells of 0.1 mm, in rows whose tip is three cells and more from a boundary: reaction to
+// 0.5 %, G to 1 %. Where that is missed the gate stands at what is reached, and says so.
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -49,8 +49,8 @@ TEST(SlowVerificationRings, ReactionWithAndWithoutExtrapolation) {
             scene.stop.time = *scene.edges[0].until;
             error[extrapolate] = simulate(scene).series.back().force / row.reaction - 1;
         }
-        std::printf("rings, a = %.1f mm: reaction off by %+.2f %% on one grid, %+.2f %% extrapolated from two\n", 1e3 * row.crack_length,
-                    100 * error[0], 100 * error[1]);
+        std::printf("rings, a = %.1f mm: reaction off by %+.2f %% on one grid, %+.2f %% extrapolated from two\n",
+                    1e3 * row.crack_length, 100 * error[0], 100 * error[1]);
         EXPECT_LT(std::abs(error[0]), is_shortest(row) ? 0.0082 : 0.005) << row.crack_length;
         EXPECT_LT(std::abs(error[1]), is_shortest(row) ? 0.0057 : 0.005) << row.crack_length;
     }
@@ -93,9 +93,10 @@ void check_rates(double cell, const Bars& contour, const Bars& energy) {
         const Rates rates = rates_of(row.crack_length, cell);
         const double reaction = rates.reaction / row.reaction - 1;
         const double by_contour = rates.by_contour / row.rate - 1, by_energy = rates.by_energy / row.rate - 1;
-        std::printf("rings, cells of %.2f mm, a = %.1f mm, tip %.2f mm from a boundary: reaction off by %+.2f %%, G by %+.2f %% (J), "
-                    "%+.2f %% (energy)\n",
-                    1e3 * cell, 1e3 * row.crack_length, 1e3 * row.distance, 100 * reaction, 100 * by_contour, 100 * by_energy);
+        std::printf(
+            "rings, cells of %.2f mm, a = %.1f mm, tip %.2f mm from a boundary: reaction off by %+.2f %%, G by %+.2f %% (J), "
+            "%+.2f %% (energy)\n",
+            1e3 * cell, 1e3 * row.crack_length, 1e3 * row.distance, 100 * reaction, 100 * by_contour, 100 * by_energy);
         EXPECT_LT(std::abs(reaction), is_shortest(row) ? 0.0082 : 0.005) << row.crack_length;
         EXPECT_LT(std::abs(by_contour), bar_of(row, contour)) << row.crack_length;
         EXPECT_LT(std::abs(by_energy), bar_of(row, energy)) << row.crack_length;
@@ -103,7 +104,7 @@ void check_rates(double cell, const Bars& contour, const Bars& energy) {
 }
 
 TEST(VerificationRings, ReactionAndEnergyReleaseRate) {
-    check_rates(0.1e-3, {0.01, 0.035, 0.045, 0.072}, {0.01, 0.035, 0.074, 0.024});
+    check_rates(0.1e-3, {0.01, 0.042, 0.043, 0.01}, {0.01, 0.035, 0.072, 0.023});
 }
 
 TEST(SlowVerificationRings, ReactionAndEnergyReleaseRateOnAFinerGrid) {
