@@ -168,6 +168,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     const double from = rows.x().front();
     const double to = rows.x().back();
     arrival_window_ = smoothing_window * (to - from);
+    arrival_end_ = to;
     const Curve crack = rows.smoothed(arrival_window_);
     const double shortest = rows.mean(from, from + arrival_window_);
     const double longest = rows.mean(to - arrival_window_, to);
@@ -217,6 +218,11 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
     Curve force(abscissa, forces);
     if (record.status == RunStatus::split) {
         force.continue_with(0.0);
+    }
+    // A run may end, with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
+    if (!abscissa.empty() && abscissa.back() < arrival_end_) {
+        abscissa.push_back(arrival_end_);
+        lengths.push_back(lengths.back());
     }
     const Curve crack = Curve(abscissa, lengths).smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());

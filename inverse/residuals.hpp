@@ -66,6 +66,7 @@ class Comparison {
     double to_ = 0;
     double window_ = 0;          // of the average of force [m] or [s]
     double arrival_window_ = 0;  // of the average of crack length [m] or [s]
+    double arrival_end_ = 0;     // of the measured crack lengths
     double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
     std::vector<FitResidual> stations_;
     std::vector<std::string> remarks_;
