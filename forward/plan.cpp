@@ -188,6 +188,9 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const double expected = std::min(motion, needed);
     plan.rotates = expected > most_rotation * smallest;
     plan.linear = plan.quasistatic && !plan.rotates && !slides && travel.together;
+    if (plan.quasistatic && !plan.linear && plan.driven && !std::isfinite(plan.end_time))
+        refuse(scene, "stop", "crack_length alone", "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
+                                                    "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);

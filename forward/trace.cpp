@@ -13,6 +13,8 @@ namespace {
 // After a jump the same instant follows once more, later by this part of the run: times stay in order.
 constexpr double just_after = 1e-9;
 
+constexpr double rounding = 1e-6;  // of the time between two rows
+
 // One instant of the way: what a row of the series shows.
 struct Moment {
     LoadState load;
@@ -192,7 +194,7 @@ class Tracer {
             stop = std::min(stop, (end_time() - from.load.time) / (to.load.time - from.load.time));
         stop = std::max(stop, 0.0);
         const double span = to.load.time - from.load.time;
-        for (double time = next_sample(from.load.time); time < from.load.time + stop * span; time += sample_)
+        for (double time = next_sample(from.load.time); time < from.load.time + stop * span - rounding * sample_; time = next_sample(time))
             add(mixed(from, to, (time - from.load.time) / span), false);
         add(mixed(from, to, stop), false);
         if (stop < 1.0 || beyond_length(to) || beyond_displacement(to) || beyond_time(to))
@@ -201,7 +203,7 @@ class Tracer {
 
     // The crack stands while the load rises.
     void stand(std::size_t i, Moment from, double until) {
-        for (double time = next_sample(from.load.time); time < until && !done_; time += sample_) {
+        for (double time = next_sample(from.load.time); time < until - rounding * sample_ && !done_; time = next_sample(time)) {
             const Moment to = moment(i, time);
             go(from, to);
             from = to;
@@ -209,7 +211,7 @@ class Tracer {
         if (!done_ && until > from.load.time) go(from, moment(i, until));
     }
 
-    double next_sample(double time) const { return (std::floor(time / sample_ * (1.0 + 1e-12)) + 1.0) * sample_; }
+    double next_sample(double time) const { return (std::floor(time / sample_ + rounding) + 1.0) * sample_; }
 
     void add(const Moment& m, bool jumped) {
         if (!record_.series.empty() && m.load.time <= record_.series.back().time) return;

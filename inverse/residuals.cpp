@@ -219,8 +219,12 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
     if (record.status == RunStatus::split) {
         force.continue_with(0.0);
     }
-    // A run may end, with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
-    if (!abscissa.empty() && abscissa.back() < arrival_end_) {
+    // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
+    const double end = *std::max_element(abscissa.begin(), abscissa.end());
+    const std::size_t rows = abscissa.size();
+    const bool ends_with_jump = rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-6 * arrival_window_ &&
+                                lengths[rows - 1] > lengths[rows - 2];
+    if (ends_with_jump && end < arrival_end_) {
         abscissa.push_back(arrival_end_);
         lengths.push_back(lengths.back());
     }
@@ -233,7 +237,7 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
         if (station.kind == "force") {
             value = force_at(force, station.at);
         } else {
-            value = crack.arrival(station.at).value_or(crack.x().back() + pace_ * (station.at - longest));
+            value = crack.arrival(station.at).value_or(end + pace_ * (station.at - longest));
         }
     }
     return values;

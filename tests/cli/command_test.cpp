@@ -191,7 +191,7 @@ TEST(SystemCommand, CsvRefusesUnknownTablesAndSettings) {
     const Outcome outcome = command.run({"csv", command.path("record.h5"), "serie"});
     EXPECT_EQ(outcome.status, 2);
     EXPECT_EQ(outcome.out, "");
-    EXPECT_TRUE(contains(outcome.error, "series, reactions")) << outcome.error;
+    EXPECT_TRUE(contains(outcome.error, "series, driving, reactions")) << outcome.error;
     EXPECT_EQ(command.run({"csv", command.path("record.h5"), "series", "--set", "a=1"}).status, 2);
     EXPECT_EQ(command.run({"csv", command.path("none.h5"), "series"}).status, 2);
 }

@@ -158,7 +158,7 @@ TEST(VerificationHertz, HalfWidthAndPeak) {
     double total = 0, second = 0;
     for (const auto& touch : same.touches({0.0, -travel}, rest.equilibrium.displacements())) {
         const Facet& facet = rest.body.facets[touch.facet];
-        const double push = touch.stiffness * touch.depth;
+        const double push = touch.force;
         total += push;
         second += push * facet.position.x() * facet.position.x();
         force[static_cast<int>(facet.position.x() / cell)] += push;
