@@ -14,9 +14,10 @@ constexpr double search_margin = 2.0;  // in cells; parts move by far less betwe
 // time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
 constexpr double stiffness_in_cells = 10.0;
 
-// Over twice this depth, in cells, contact sets in: the force grows with its square there, so that Newton's method sees a touch
+// Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a touch
 // coming; from there on it grows evenly.
-constexpr double onset_in_cells = 0.01;
+constexpr double onset_in_cells = 0.0003;
+constexpr double at_touch = 0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
 
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
@@ -106,14 +107,16 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
         if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) continue;
         const double k = stiffness_[i];
         if (depth < 2.0 * onset) {
-            touch.force = k * depth * depth / (4.0 * onset);
-            touch.stiffness = k * depth / (2.0 * onset);
-            touch.energy = touch.force * depth / 3.0;
+            const double grows = 1.0 - at_touch;
+            touch.force = k * depth * (at_touch + grows * depth / (4.0 * onset));
+            touch.stiffness = k * (at_touch + grows * depth / (2.0 * onset));
+            touch.energy = k * depth * depth * (at_touch / 2.0 + grows * depth / (12.0 * onset));
         } else {
-            const double d = depth - onset;
+            const double d = depth - (1.0 - at_touch) * onset;
             touch.force = k * d;
             touch.stiffness = k;
-            touch.energy = 0.5 * k * d * d + k * onset * onset / 6.0;
+            const double at_end = 2.0 * at_touch + (1.0 - at_touch) * 2.0 / 3.0 - 0.5 * (1.0 + at_touch) * (1.0 + at_touch);
+            touch.energy = 0.5 * k * d * d + at_end * k * onset * onset;
         }
         found.push_back(touch);
     }

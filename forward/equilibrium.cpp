@@ -267,7 +267,12 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-        if (renew && !factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
+        if (renew && !factor_tangent(true) && !factor_tangent(false)) {
+            if (time_ == time) return Outcome::mechanism;
+            time_ = time;  // held by bodies that do not touch yet, perhaps: try with these where they are going
+            find_forces();
+            if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
+        }
         Eigen::VectorXd right = step_load_;
         step_load_.setZero();
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)

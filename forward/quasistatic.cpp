@@ -50,8 +50,7 @@ struct Quasistatic::Coarse {
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials)
     : Quasistatic(scene, plan, materials, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, *this);
-    const bool held = plan.linear ? know_linear(0) : know(0, 0);
-    if (!held) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+    if (!(plan.linear ? know_linear(0) : rests() && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader)
@@ -133,6 +132,16 @@ LoadState Quasistatic::nothing(double time) const {
 void Quasistatic::keep(std::size_t number, int time, LoadState state) {
     if (coarse_) extrapolate(state, coarse_->walk.places_[number].station.states.at(time));
     places_[number].station.states[time] = std::move(state);
+}
+
+// Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
+bool Quasistatic::rests() {
+    if (coarse_ && !coarse_->walk.rests()) return false;
+    if (!equilibrium_.boundary().tractions.empty()) return know(0, 0);
+    const std::size_t fields = equilibrium_.displacements().size();
+    places_[0].known[0] = {0, std::vector<Vec2>(fields, Vec2::Zero()), 0.0, 0.0};
+    keep(0, 0, nothing(0.0));
+    return true;
 }
 
 // In a linear scene no load and full load say all; the state half way is between them.
