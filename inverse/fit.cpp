@@ -21,7 +21,8 @@ namespace {
 constexpr double bound_tolerance = 1e-4;  // of the box
 
 // Displacements at which a crack moves differ by this much from grid to grid: in explicit dynamics for vibration and for arrests
-// between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample, `benchmark_grids`).
+// between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
+// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more).
 constexpr double solver_resolution = 0.02;
 
 using Clock = std::chrono::steady_clock;
