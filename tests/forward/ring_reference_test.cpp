@@ -40,7 +40,7 @@ bool is_shortest(const Row& row) { return row.crack_length < 1.1e-3; }
 
 TEST(SlowVerificationRings, ReactionWithAndWithoutExtrapolation) {
     const std::vector<Row> rows = reference_rows();
-    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";
+    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
     for (const Row& row : rows) {
         double error[2];
         for (const bool extrapolate : {false, true}) {
@@ -88,7 +88,7 @@ double bar_of(const Row& row, const Bars& bars) {
 
 void check_rates(double cell, const Bars& contour, const Bars& energy) {
     const std::vector<Row> rows = reference_rows();
-    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";
+    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
     for (const Row& row : rows) {
         const Rates rates = rates_of(row.crack_length, cell);
         const double reaction = rates.reaction / row.reaction - 1;
