@@ -150,25 +150,20 @@ void CrackFields::sort_points(int crack, const Box& window) {
     const Layout& layout = body_->layout;
     Points& points = body_->points;
     const std::uint8_t bit = static_cast<std::uint8_t>(1u << crack);
-    const int first = layout.cell_at(window.low);
-    const int last = layout.cell_at(window.high);
-    for (int j = first / layout.cells_x; j <= last / layout.cells_x; ++j) {
-        for (int i = first % layout.cells_x; i <= last % layout.cells_x; ++i) {
-            const int c = layout.cell_index(i, j);
-            const std::array<int, 4> nodes = layout.cell_nodes(c);
-            for (int k = 0; k < 4; ++k) {
-                const bool node_left = is_left(crack, layout.node_position(nodes[k]));
-                const bool split = freed(crack, nodes[k]) >= least_freed_;
-                for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-                    const bool apart = is_left(crack, points.position[p]) != node_left;
-                    std::uint8_t& mask = mask_[p][k];
-                    const bool was_apart = mask & bit;
-                    mask = static_cast<std::uint8_t>(apart && (split || was_apart) ? mask | bit : mask & ~bit);
-                    points.node[p][k] = field(nodes[k], mask, crack);
-                }
+    body_->for_cells_in(window, [&](int c) {
+        const std::array<int, 4> nodes = layout.cell_nodes(c);
+        for (int k = 0; k < 4; ++k) {
+            const bool node_left = is_left(crack, layout.node_position(nodes[k]));
+            const bool split = freed(crack, nodes[k]) >= least_freed_;
+            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
+                const bool apart = is_left(crack, points.position[p]) != node_left;
+                std::uint8_t& mask = mask_[p][k];
+                const bool was_apart = mask & bit;
+                mask = static_cast<std::uint8_t>(apart && (split || was_apart) ? mask | bit : mask & ~bit);
+                points.node[p][k] = field(nodes[k], mask, crack);
             }
         }
-    }
+    });
 }
 
 int CrackFields::field(int node, unsigned mask, int crack) {
@@ -224,11 +219,15 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
     if (straight) (at_end ? line.points.back() : line.points.front()) = to;
     else line.points.insert(at_end ? line.points.end() : line.points.begin(), to);
 
-    const Vec2 reach = 3.0 * body_->layout.cell;
     new_fields_.clear();
-    sort_points(crack, {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach});
+    sort_points(crack, window(from, to));
     renew_ties(crack);
     return new_fields_;
+}
+
+Box CrackFields::window(const Vec2& from, const Vec2& to) const {
+    const Vec2 reach = 3.0 * body_->layout.cell;
+    return {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach};
 }
 
 Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const {

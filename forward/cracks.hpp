@@ -69,6 +69,9 @@ class CrackFields {
     /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Returns the fields that this adds.
     std::vector<NewField> grow(int crack, bool at_end, const Vec2& to);
 
+    /// Where points change sides when a tip goes from one place to another.
+    Box window(const Vec2& from, const Vec2& to) const;
+
     /// Displacement jump (left minus right) across a crack at a place on it, from the fields' displacements [m].
     Vec2 opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const;
 

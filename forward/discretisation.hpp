@@ -104,8 +104,14 @@ class Discretisation {
     /// Calls `visit(c)` for every cell that a square of half width `reach` about x touches.
     template <class Visit>
     void for_cells_near(const Vec2& x, double reach, Visit visit) const {
-        const int low = layout.cell_at(x.array() - reach);
-        const int high = layout.cell_at(x.array() + reach);
+        for_cells_in({x.array() - reach, x.array() + reach}, visit);
+    }
+
+    /// The same for a box.
+    template <class Visit>
+    void for_cells_in(const Box& box, Visit visit) const {
+        const int low = layout.cell_at(box.low);
+        const int high = layout.cell_at(box.high);
         for (int j = low / layout.cells_x; j <= high / layout.cells_x; ++j)
             for (int i = low % layout.cells_x; i <= high % layout.cells_x; ++i) visit(layout.cell_index(i, j));
     }

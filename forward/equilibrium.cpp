@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 namespace crampfit {
@@ -37,7 +36,7 @@ constexpr double least_strain = 1e-5;
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, plan.rotates),
-      node_order_(dissection_order(body.layout.cells_x + 1, body.layout.cells_y + 1)) {
+      factor_(body.layout.cells_x, body.layout.cells_y) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body);
@@ -54,29 +53,34 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
 void Equilibrium::renumber() {
     const int fields = cracks_.fields();
     mass_ = field_masses(body_, fields);
-    std::vector<int> order(fields);
-    std::iota(order.begin(), order.end(), 0);
-    const auto place = [&](int field) { return node_order_[cracks_.node_of_field[field]]; };
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return place(a) < place(b); });
     equation_.assign(2 * fields, 0);
     for (const Boundary::Held& held : boundary_.held) equation_[2 * held.field + held.axis] = -1;
-    equations_ = 0;
-    for (const int field : order) {
-        for (int axis = 0; axis < 2; ++axis) {
-            int& equation = equation_[2 * field + axis];
-            if (mass_[field] == 0.0) equation = -1;
-            if (equation == 0) equation = equations_++;
-        }
+    std::vector<int> count(body_.layout.nodes(), 0);
+    for (int dof = 0; dof < 2 * fields; ++dof) {
+        if (mass_[dof / 2] == 0.0) equation_[dof] = -1;
+        if (equation_[dof] == 0) equation_[dof] = count[cracks_.node_of_field[dof / 2]]++;  // its place at the node
     }
-    new_pattern_ = true;
+    std::vector<int> first(count.size());
+    std::vector<int> node_at(count.size());
+    for (std::size_t n = 0; n < count.size(); ++n) node_at[factor_.places()[n]] = static_cast<int>(n);
+    equations_ = 0;
+    for (const int node : node_at) {
+        first[node] = equations_;
+        equations_ += count[node];
+    }
+    for (int dof = 0; dof < 2 * fields; ++dof)
+        if (equation_[dof] >= 0) equation_[dof] += first[cracks_.node_of_field[dof / 2]];
+    factor_.set_equations(first, count);
 }
 
 std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, const Vec2& to) {
+    const Box changed = cracks_.window(cracks_.lines[crack].tip(at_end).position, to);
     const auto fields = cracks_.grow(crack, at_end, to);
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
     boundary_.adopt(fields);
     internal_force_.sort_cells();
     renumber();
+    body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
 }
 
@@ -120,40 +124,33 @@ void Equilibrium::find_forces() {
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
 
-void Equilibrium::add_tangent(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& tangent) {
+// Of points or a facet of a cell. What prescribed components still have to go loads the others.
+GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    GridFactor::Element made{{}, stiffness};
+    for (int a = 0; a < 8; ++a) made.equation[a] = equation_[2 * fields[a / 2] + a % 2];
     for (int b = 0; b < 8; ++b) {
-        const int column_dof = 2 * fields[b / 2] + b % 2;
-        const int column = equation_[column_dof];
-        const double step = prescribed_step_[column_dof];
-        for (int a = 0; a < 8; ++a) {
-            const int row = equation_[2 * fields[a / 2] + a % 2];
-            if (row < 0) continue;
-            if (column < 0) step_load_[row] -= tangent(a, b) * step;
-            else if (row >= column) entries_.emplace_back(row, column, tangent(a, b));
-        }
+        const double step = prescribed_step_[2 * fields[b / 2] + b % 2];
+        if (made.equation[b] >= 0 || step == 0.0) continue;
+        for (int a = 0; a < 8; ++a)
+            if (made.equation[a] >= 0) step_load_[made.equation[a]] -= stiffness(a, b) * step;
     }
+    return made;
 }
 
-void Equilibrium::add_pair(const FieldPair& pair, const Mat2& stiffness) {
-    const std::array<int, 2> field{pair.left, pair.right};
-    for (int side = 0; side < 2; ++side) {
-        for (int other = 0; other < 2; ++other) {
-            const double sign = side == other ? 1.0 : -1.0;
-            for (int i = 0; i < 2; ++i) {
-                for (int j = 0; j < 2; ++j) {
-                    const int row = equation_[2 * field[side] + i];
-                    const int column = equation_[2 * field[other] + j];
-                    if (row >= 0 && column >= 0 && row >= column) entries_.emplace_back(row, column, sign * stiffness(i, j));
-                }
-            }
-        }
+GridFactor::Element Equilibrium::element(const FieldPair& pair, const Mat2& stiffness) const {
+    GridFactor::Element made;
+    made.equation.fill(-1);
+    made.stiffness.setZero();
+    made.stiffness.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
+    for (int axis = 0; axis < 2; ++axis) {
+        made.equation[axis] = equation_[2 * pair.left + axis];
+        made.equation[2 + axis] = equation_[2 * pair.right + axis];
     }
+    return made;
 }
 
-bool Equilibrium::factor_tangent(bool geometric) {
+void Equilibrium::add_points(int c, bool geometric, std::vector<GridFactor::Element>& elements) {
     const Points& points = body_.points;
-    entries_.clear();
-    step_load_.setZero(equations_);
     const auto add_point = [&](int p, Eigen::Matrix<double, 8, 8>& sum) {
         const CellWeights& w = body_.weights[points.slot[p]];
         const Eigen::Matrix4d A =
@@ -169,45 +166,68 @@ bool Equilibrium::factor_tangent(bool geometric) {
             }
         }
     };
-    for (int c = 0; c < body_.layout.cells(); ++c) {
-        Eigen::Matrix<double, 8, 8> sum;
-        int p = points.first_of_cell[c];
-        const int last = points.first_of_cell[c + 1];
-        while (p < last) {  // points side by side on the same fields go together
-            const std::array<int, 4>& fields = points.node[p];
-            sum.setZero();
-            for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
-            add_tangent(fields, sum);
-        }
+    int p = points.first_of_cell[c];
+    const int last = points.first_of_cell[c + 1];
+    while (p < last) {  // points side by side on the same fields go together
+        const std::array<int, 4>& fields = points.node[p];
+        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+        for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
+        elements.push_back(element(fields, sum));
     }
-    for (const FieldPair& pair : cracks_.pairs)
-        if (mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0) add_pair(pair, pair_stiffness(pair));
+}
+
+void Equilibrium::add_pairs() {
+    const Layout& layout = body_.layout;
+    pair_stiffness_.resize(cracks_.pairs.size(), Mat2::Zero());
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        const int i = std::min(pair.node % (layout.cells_x + 1), layout.cells_x - 1);
+        const int j = std::min(pair.node / (layout.cells_x + 1), layout.cells_y - 1);
+        const int cell = layout.cell_index(i, j);
+        const Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
+        if (std::exchange(pair_stiffness_[k], stiffness) != stiffness) factor_.mark(cell);
+        if (!stiffness.isZero(0.0)) extra_.emplace(cell, element(pair, stiffness));
+    }
+}
+
+void Equilibrium::add_touches(bool geometric) {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const Vec2 gone = boundary_.travel(sliding_driver_[i], time_);
         const Vec2 still_to_go = boundary_.travel(sliding_driver_[i], next_time_) - gone;
         for (const SlidingBody::Touch& touch : sliding_[i].touches(gone, displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
+            const std::array<int, 4>& fields = body_.points.node[facet.point];
             const Mat2 along = touch.normal * touch.normal.transpose();
             const double turning = geometric ? touch.force * touch.curvature : 0.0;
             const Mat2 stiffness = touch.stiffness * along - turning * (Mat2::Identity() - along);
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
-            add_tangent(points.node[facet.point], tangent);
+            extra_.emplace(body_.points.cell[facet.point], element(fields, tangent));
             const Vec2 push = stiffness * still_to_go;  // that the body's way adds, if what it touches stays the same
             for (int k = 0; k < 4; ++k)
                 for (int axis = 0; axis < 2; ++axis) {
-                    const int row = equation_[2 * points.node[facet.point][k] + axis];
+                    const int row = equation_[2 * fields[k] + axis];
                     if (row >= 0) step_load_[row] += facet.weight[k] * push[axis];
                 }
         }
     }
-    Eigen::SparseMatrix<double> matrix(equations_, equations_);
-    matrix.setFromTriplets(entries_.begin(), entries_.end());
+}
+
+// In a linear scene only what a growing crack has changed is factored anew.
+bool Equilibrium::factor_tangent(bool geometric) {
+    if (!plan_.linear) factor_.mark_all();
+    step_load_.setZero(equations_);
+    extra_.clear();
+    add_pairs();
+    add_touches(geometric);
     ++factorisations_;
-    const bool good = factor_.factor(matrix, new_pattern_) && factor_.reciprocal_condition() > least_reciprocal_condition;
-    new_pattern_ = false;
-    return good;
+    const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
+        add_points(cell, geometric, elements);
+        const auto [first, last] = extra_.equal_range(cell);
+        for (auto other = first; other != last; ++other) elements.push_back(other->second);
+    };
+    return factor_.factor(assemble) && factor_.reciprocal_condition() > least_reciprocal_condition;
 }
 
 double Equilibrium::largest_residual() const {
@@ -224,6 +244,13 @@ void Equilibrium::prescribe(double time) {
         prescribed_step_[2 * held.field + held.axis] =
             boundary_.travel(held.driver, time)[held.axis] - displacement_[held.field][held.axis];
     next_time_ = time;
+    if (plan_.linear) move_prescribed();
+}
+
+void Equilibrium::move_prescribed() {
+    time_ = next_time_;
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof) displacement_[dof / 2][dof % 2] += prescribed_step_[dof];
+    std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
 }
 
 // Slope of the potential along a step of the equations' unknowns [J].
@@ -273,16 +300,14 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             find_forces();
             if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         }
-        Eigen::VectorXd right = step_load_;
+        Eigen::MatrixXd step = step_load_;
         step_load_.setZero();
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-            if (equation_[dof] >= 0) right[equation_[dof]] += force_[dof / 2][dof % 2];
-        const Eigen::VectorXd step = factor_.solve(right);
+            if (equation_[dof] >= 0) step(equation_[dof]) += force_[dof / 2][dof % 2];
+        factor_.solve(step);
         const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
         if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
-            time_ = time;
-            for (std::size_t dof = 0; dof < equation_.size(); ++dof) displacement_[dof / 2][dof % 2] += prescribed_step_[dof];
-            std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
+            move_prescribed();
             move(step, 1.0);
             find_forces();
         } else {
@@ -343,6 +368,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     time_ = next_time_ = snapshot.time;
     internal_force_.sort_cells();
     renumber();
+    factor_.mark_all();
     find_forces();
 }
 

@@ -3,10 +3,11 @@
 #include "forward/boundary.hpp"
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
+#include "forward/grid_factor.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/plan.hpp"
-#include "forward/sparse_factor.hpp"
 
+#include <map>
 #include <vector>
 
 namespace crampfit {
@@ -39,7 +40,7 @@ class Equilibrium {
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
     TipLoad load_at(int crack, bool at_end) const;
-    double reciprocal_condition() const { return factor_.reciprocal_condition(); }
+    double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
     int factorisations() const { return factorisations_; }
 
     /// Everything that growth and solution change, to come back to.
@@ -58,8 +59,11 @@ class Equilibrium {
     void renumber();
     void find_forces();
     bool factor_tangent(bool geometric);
-    void add_tangent(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& tangent);
-    void add_pair(const FieldPair& pair, const Mat2& stiffness);
+    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    GridFactor::Element element(const FieldPair& pair, const Mat2& stiffness) const;
+    void add_points(int cell, bool geometric, std::vector<GridFactor::Element>& elements);
+    void add_pairs();
+    void add_touches(bool geometric);
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
     double largest_residual() const;
@@ -67,6 +71,7 @@ class Equilibrium {
     void move(const Eigen::VectorXd& step, double share);
     void take_step(const Eigen::VectorXd& step);
     void prescribe(double time);
+    void move_prescribed();
 
     const Scene& scene_;
     const Plan& plan_;
@@ -91,14 +96,13 @@ class Equilibrium {
     double time_ = 0;                 // [s]
     double next_time_ = 0;            // that is being solved for [s]
 
-    std::vector<int> node_order_;     // [nodes] place in the elimination
+    GridFactor factor_;
     std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
-    bool new_pattern_ = true;
-    std::vector<Eigen::Triplet<double>> entries_;
+    std::vector<Mat2> pair_stiffness_;  // [pairs] as last factored [N/m]
+    std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
     std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
     Eigen::VectorXd step_load_;       // what that puts on the equations [N]
-    SparseFactor factor_;
     int factorisations_ = 0;
 };
 

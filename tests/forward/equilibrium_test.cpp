@@ -1,16 +1,15 @@
 // The static solver in its parts: derivatives, elimination, ties, and equilibria that are known.
 #include "datasets/error.hpp"
-#include "forward/sparse_factor.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <Eigen/Dense>
-#include <Eigen/SparseCholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <random>
 
 namespace crampfit::test {
@@ -139,87 +138,130 @@ TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
     }
 }
 
-TEST(UnitDissection, CountsEveryNodeOnce) {
-    for (const auto& [x, y] : {std::pair{1, 1}, {2, 7}, {3, 3}, {13, 4}, {40, 41}}) {
-        std::vector<int> order = dissection_order(x, y);
-        std::sort(order.begin(), order.end());
-        ASSERT_EQ(order.size(), static_cast<std::size_t>(x * y));
-        for (int k = 0; k < x * y; ++k) ASSERT_EQ(order[k], k) << x << " x " << y;
+// A grid whose nodes have so many equations each, every cell with a random element that is positive definite.
+struct RandomGrid {
+    int cells_x, cells_y;
+    GridFactor factor{cells_x, cells_y};
+    std::vector<int> first, count;
+    std::vector<GridFactor::Element> element;  // [cells]
+    std::mt19937 random{5};
+
+    RandomGrid(int x, int y) : cells_x(x), cells_y(y) {
+        count.resize((x + 1) * (y + 1));
+        for (int& c : count) c = std::uniform_int_distribution<int>(0, 2)(random);
+        number();
+        element.resize(x * y);
+        for (int c = 0; c < x * y; ++c) change(c);
     }
-}
-
-Eigen::SparseMatrix<double> matrix_of(int size, const std::vector<Eigen::Triplet<double>>& entries) {
-    Eigen::SparseMatrix<double> matrix(size, size);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    return matrix;
-}
-
-// Entries of the Cholesky factor of a grid's nine-point matrix with the nodes in this order.
-long entries_of_factor(int side, const std::vector<int>& place) {
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int j = 0; j < side; ++j)
-        for (int i = 0; i < side; ++i)
-            for (int n = std::max(0, j - 1); n <= std::min(side - 1, j + 1); ++n)
-                for (int m = std::max(0, i - 1); m <= std::min(side - 1, i + 1); ++m)
-                    entries.emplace_back(place[j * side + i], place[n * side + m], i == m && j == n ? 9.0 : -1.0);
-    const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(
-        matrix_of(side * side, entries));
-    return factor.matrixL().nestedExpression().nonZeros();
-}
-
-TEST(UnitDissection, FillsInLittle) {
-    // George (1973), theorem 2: at most 31/4 n^2 log2 n entries for n x n nodes (leading term); row by row it is n^3.
-    const int side = 64;
-    std::vector<int> by_row(side * side);
-    for (int k = 0; k < side * side; ++k) by_row[k] = k;
-    const long dissected = entries_of_factor(side, dissection_order(side, side));
-    std::printf("factor of %d x %d nodes: %ld entries, row by row %ld\n", side, side, dissected, entries_of_factor(side, by_row));
-    EXPECT_LT(dissected, 7.75 * side * side * std::log2(side));
-}
-
-Eigen::SparseMatrix<double> random_matrix(int size, std::mt19937& random) {
-    std::uniform_real_distribution<double> in(-1.0, 1.0);
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int k = 0; k < size; ++k) {
-        entries.emplace_back(k, k, 2.0 + in(random));
-        entries.emplace_back(k, (7 * k + 3) % size, in(random));
-    }
-    const Eigen::SparseMatrix<double> spread = matrix_of(size, entries);
-    return spread * Eigen::SparseMatrix<double>(spread.transpose());
-}
-
-TEST(UnitSparseFactor, SolvesAsADenseFactorDoes) {
-    std::mt19937 random(5);
-    SparseFactor factor;
-    for (const int size : {1, 7, 60}) {
-        Eigen::SparseMatrix<double> matrix = random_matrix(size, random);
-        const Eigen::MatrixXd right = Eigen::MatrixXd::Random(size, 3);
-        for (const bool new_pattern : {true, false}) {  // then other values at the same places
-            if (!new_pattern) matrix *= 1.7;
-            ASSERT_TRUE(factor.factor(matrix.triangularView<Eigen::Lower>(), new_pattern)) << size;
-            const Eigen::MatrixXd exact = Eigen::MatrixXd(matrix).ldlt().solve(right);
-            const double condition = Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues()[0] /
-                                     Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues()[size - 1];
-            EXPECT_LT((factor.solve(right) - exact).norm(), 1e-14 * condition * exact.norm()) << size;
+    void number() {
+        std::vector<int> node_at(count.size());
+        for (std::size_t n = 0; n < count.size(); ++n) node_at[factor.places()[n]] = static_cast<int>(n);
+        first.resize(count.size());
+        int next = 0;
+        for (const int n : node_at) {
+            first[n] = next;
+            next += count[n];
         }
+        factor.set_equations(first, count);
+    }
+    int equations() const { return std::accumulate(count.begin(), count.end(), 0); }
+    void change(int c) {
+        const int corner = c / cells_x * (cells_x + 1) + c % cells_x;
+        const std::array<int, 4> nodes{corner, corner + 1, corner + cells_x + 1, corner + cells_x + 2};
+        std::uniform_real_distribution<double> in(-1.0, 1.0);
+        Eigen::Matrix<double, 8, 8> spread = Eigen::Matrix<double, 8, 8>::NullaryExpr([&]() { return in(random); });
+        element[c].stiffness = spread * spread.transpose() + 0.1 * Eigen::Matrix<double, 8, 8>::Identity();
+        for (int a = 0; a < 8; ++a) element[c].equation[a] = a % 2 < count[nodes[a / 2]] ? first[nodes[a / 2]] + a % 2 : -1;
+    }
+    bool make() { return factor.factor([&](int c, auto& elements) { elements.push_back(element[c]); }); }
+    Eigen::MatrixXd dense() const {
+        Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(equations(), equations());
+        for (const auto& e : element)
+            for (int a = 0; a < 8; ++a)
+                for (int b = 0; b < 8; ++b)
+                    if (e.equation[a] >= 0 && e.equation[b] >= 0) matrix(e.equation[a], e.equation[b]) += e.stiffness(a, b);
+        return matrix;
+    }
+    // Error of the solution for some right sides, of its size and the condition number.
+    double error() {
+        const Eigen::MatrixXd matrix = dense();
+        const Eigen::MatrixXd exact = Eigen::MatrixXd::Random(equations(), 3);
+        Eigen::MatrixXd found = matrix * exact;
+        const Eigen::MatrixXd one = found.col(1);
+        factor.solve(found);
+        Eigen::MatrixXd alone = one;
+        factor.solve(alone);
+        const Eigen::VectorXd pivots = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix).eigenvalues();
+        const double condition = pivots.tail(1)[0] / pivots[0];
+        return std::max((found - exact).norm() / exact.norm(), (alone - exact.col(1)).norm() / exact.col(1).norm()) / condition;
+    }
+};
+
+TEST(UnitGridFactor, EliminatesEveryNodeOnce) {
+    for (const auto& [x, y] : {std::pair{1, 1}, {2, 7}, {4, 4}, {13, 5}, {40, 41}}) {
+        std::vector<int> places = GridFactor(x, y).places();
+        std::sort(places.begin(), places.end());
+        ASSERT_EQ(places.size(), static_cast<std::size_t>((x + 1) * (y + 1)));
+        for (std::size_t k = 0; k < places.size(); ++k) ASSERT_EQ(places[k], static_cast<int>(k)) << x << " x " << y;
     }
 }
 
-TEST(UnitSparseFactor, RefusesWhatIsNotPositiveDefinite) {
-    std::mt19937 random(6);
-    SparseFactor factor;
-    const Eigen::SparseMatrix<double> good = random_matrix(20, random);
-    Eigen::SparseMatrix<double> bad = good;
-    bad.coeffRef(11, 11) = -1.0;
-    EXPECT_FALSE(factor.factor(bad.triangularView<Eigen::Lower>(), true));
-    // Two nodes and a spring that nothing holds.
-    EXPECT_FALSE(factor.factor(matrix_of(2, {{0, 0, 1.0}, {1, 0, -1.0}, {1, 1, 1.0}}), true));
-    EXPECT_TRUE(factor.factor(good.triangularView<Eigen::Lower>(), true)) << "a refusal must not spoil the next matrix";
+TEST(UnitGridFactor, SolvesAsADenseFactorDoes) {
+    for (const auto& [x, y] : {std::pair{1, 1}, {3, 2}, {9, 4}, {11, 13}}) {
+        RandomGrid grid(x, y);
+        ASSERT_TRUE(grid.make());
+        EXPECT_LT(grid.error(), 1e-14) << x << " x " << y;
+    }
 }
 
-TEST(UnitSparseFactor, ConditionOfADiagonal) {
-    SparseFactor factor;
-    ASSERT_TRUE(factor.factor(matrix_of(2, {{0, 0, 1.0}, {1, 1, 100.0}}), true));
+TEST(UnitGridFactor, FollowsWhatChanges) {
+    RandomGrid grid(13, 11);
+    ASSERT_TRUE(grid.make());
+    for (const int cell : {0, 71, 72, 142}) {
+        grid.change(cell);
+        grid.factor.mark(cell);
+        ASSERT_TRUE(grid.make());
+        EXPECT_LT(grid.error(), 1e-14) << "cell " << cell;
+    }
+    // A node gets more equations, as one does that a crack passes; all numbers after it shift.
+    const int node = 75;
+    grid.count[node] = grid.count[node] == 2 ? 1 : 2;
+    grid.number();
+    for (int c = 0; c < 13 * 11; ++c) {
+        const auto stiffness = grid.element[c].stiffness;
+        grid.change(c);
+        grid.element[c].stiffness = stiffness;
+    }
+    ASSERT_TRUE(grid.make());
+    EXPECT_LT(grid.error(), 1e-14);
+    grid.change(30);  // without a word: what is kept must not be made anew
+    ASSERT_TRUE(grid.make());
+    EXPECT_GT(grid.error(), 1e-6);
+}
+
+TEST(UnitGridFactor, RefusesWhatIsNotPositiveDefinite) {
+    RandomGrid grid(9, 9);
+    const auto good = grid.element[40];
+    grid.element[40].stiffness *= -50.0;
+    EXPECT_FALSE(grid.make());
+    grid.element[40] = good;
+    EXPECT_TRUE(grid.make()) << "a refusal must not spoil the next matrix";
+    EXPECT_LT(grid.error(), 1e-14);
+}
+
+TEST(UnitGridFactor, ConditionOfADiagonal) {
+    GridFactor factor(1, 1);
+    std::vector<int> first(4, 0), count(4, 0);
+    for (int n = 0; n < 2; ++n) {
+        count[n] = 1;
+        first[n] = factor.places()[n];
+    }
+    const int shift = std::min(first[0], first[1]);
+    for (int n = 0; n < 2; ++n) first[n] -= shift;
+    factor.set_equations(first, count);
+    GridFactor::Element element{{0, 1, -1, -1, -1, -1, -1, -1}, Eigen::Matrix<double, 8, 8>::Identity()};
+    element.stiffness(1, 1) = 100.0;
+    ASSERT_TRUE(factor.factor([&](int, auto& elements) { elements.push_back(element); }));
     EXPECT_NEAR(factor.reciprocal_condition(), 0.01, 1e-14);
 }
 

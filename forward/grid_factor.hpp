@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <array>
+#include <functional>
+#include <vector>
+
+namespace crampfit {
+
+/// Cholesky factor of the symmetric positive definite equations of a grid, of which each couples the unknowns at the nodes of one
+/// cell. The grid is halved again and again (nested dissection, George 1973): of each box of cells the unknowns that no cell
+/// outside it knows are eliminated, and what is left at its border goes to the box that it is a half of (multifrontal method, Duff and Reid
+/// 1983). Boxes none of whose cells has changed keep their part, so that a crack that grows costs the boxes about its tip and
+/// those that hold them: a general sparse factor would be made anew as a whole.
+class GridFactor {
+  public:
+    GridFactor(int cells_x, int cells_y);
+
+    /// Place of each node in the elimination. Nodes are counted row by row, as cells are.
+    const std::vector<int>& places() const { return place_; }
+
+    /// Equations of each node, [nodes]: those from `first` on, `count` of them. Equations are numbered by the places of their nodes.
+    void set_equations(const std::vector<int>& first, const std::vector<int>& count);
+
+    /// A stiffness between equations; those below 0 are left out.
+    struct Element {
+        std::array<int, 8> equation;
+        Eigen::Matrix<double, 8, 8> stiffness;
+    };
+
+    /// The stiffness of this cell has changed, or of all.
+    void mark(int cell);
+    void mark_all();
+
+    /// Adds the elements of a cell to a list.
+    using Assemble = std::function<void(int cell, std::vector<Element>& elements)>;
+
+    /// Factors anew what has changed. False when it is not positive definite.
+    bool factor(const Assemble& assemble);
+
+    /// Solves for right sides [equations x any number], in place.
+    void solve(Eigen::MatrixXd& right) const;
+
+    /// A cheap estimate of 1 / condition number: (least / largest diagonal entry of the factor) squared.
+    double reciprocal_condition() const;
+
+  private:
+    struct Box {
+        int parent = -1;
+        std::array<int, 2> half{-1, -1};           // children; none: a leaf
+        std::vector<int> cells;                    // of a leaf
+        std::vector<int> nodes;                    // by place: first those eliminated here, then those at the border
+        int eliminated = 0;                        // how many of the nodes
+        std::array<std::vector<int>, 2> slot;      // [halves][border nodes of the half] where they are in `nodes`
+        bool stale = true;
+
+        int inner = 0;                             // equations eliminated here
+        int border = 0;                            // equations at the border
+        Eigen::MatrixXd factor;                    // [inner + border x inner] lower triangle, and what is below
+        Eigen::MatrixXd left;                      // [border x border] what is left for the parent, lower triangle
+        double least_pivot = 0, largest_pivot = 0;
+    };
+
+    int add_box(int i0, int i1, int j0, int j1);
+    void place_nodes(Box& box, int i0, int i1, int j0, int j1);
+    const std::vector<int>& offsets(const Box& box);
+    void assemble_leaf(Box& box, const Assemble& assemble);
+    double* column_of(Box& box, int c);
+    void take_in(Box& box, int half);
+    bool eliminate(Box& box);
+    template <class Columns>
+    void solve_columns(Columns x) const;
+
+    int cells_x_, cells_y_;
+    int placed_ = 0;                 // nodes that have a place
+    std::vector<Box> boxes_;         // halves before what they are halves of
+    std::vector<int> place_;         // [nodes]
+    std::vector<int> box_of_cell_;   // its leaf
+    std::vector<int> first_, count_; // [nodes] equations
+    // Scratch of one box:
+    std::vector<int> offset_;        // [nodes of the box + 1] where the equations of each begin in its front
+    std::vector<int> local_;         // [equations] place in its front
+    std::vector<Element> elements_;
+};
+
+} // namespace crampfit
