@@ -235,25 +235,29 @@ Scene cracked_wood(const CrackedWood& c) {
 
 TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
     // Sih, Paris and Irwin 1965: K_I = s_n (pi a)^1/2, K_II = t (pi a)^1/2 whatever the wood, where the faces carry no resultant. Along
-    // an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2.
+    // an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2. Bars as for isotropic wood, on twice as many
+    // cells: shear as soft as this makes the near-tip field as much steeper.
     const double stress = 1e5, a = 10e-3, K0 = stress * std::sqrt(std::numbers::pi * a);
     const Eigen::Matrix3d b = plane_compliance(wood(), PlaneCondition::strain);
     const auto sih = [&](double b11, double b22) {
         return K0 * K0 * std::sqrt(b11 * b22 / 2) * std::sqrt(std::sqrt(b22 / b11) + (2 * b(0, 1) + b(2, 2)) / (2 * b11));
     };
-    for (const double crack : {0.0, 25.0, 45.0}) {
+    for (const double crack : {0.0, 25.0}) {
         for (const double grain : {0.0, 30.0, 60.0, 90.0, 135.0}) {
             CrackedWood c;
             c.crack = crack * degree;
             c.radial = grain * degree;
             c.remote(1, 1) = stress;
+            c.cells = 20;
             const AtRest run(cracked_wood(c));
             ASSERT_TRUE(run.solved());
             const double K_I = K0 * std::cos(c.crack) * std::cos(c.crack), K_II = K0 * std::cos(c.crack) * std::sin(c.crack);
             const Mat2 H = near_tip_field(from_axes(b.inverse(), toward(c.radial)), toward(c.crack)).release();
             const double G = Vec2(K_I, K_II).dot(H * Vec2(K_I, K_II));
-            if (crack == 0.0 && grain == 0.0) EXPECT_NEAR(G, sih(b(0, 0), b(1, 1)), 1e-12 * G);
-            if (crack == 0.0 && grain == 90.0) EXPECT_NEAR(G, sih(b(1, 1), b(0, 0)), 1e-12 * G);
+            if (crack == 0.0 && (grain == 0.0 || grain == 90.0)) {
+                const bool along = grain == 0.0;
+                EXPECT_NEAR(G, along ? sih(b(0, 0), b(1, 1)) : sih(b(1, 1), b(0, 0)), 1e-12 * G);
+            }
             for (const bool at_end : {true, false}) {
                 const TipLoad load = run.load(at_end);
                 std::printf("crack at %4.1f, grain at %5.1f deg, %s: K_I off by %+.2f %%, K_II by %+.2f %% of K0, G by %+.2f %%\n", crack, grain,
@@ -267,13 +271,15 @@ TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
 }
 
 TEST(VerificationOrthotropicCrack, GIsTheLossOfPotentialPerCrackLength) {
-    // -dPi / da by central differences over half a cell either way, boundary tractions held.
+    // -dPi / da by central differences, tractions on the sides held. Over five cells either way, as the tip of a crack oblique to the
+    // grid lies exact to a tenth of a cell.
     for (const auto& [crack, grain] : {std::pair{0.0, 40.0}, {30.0, 0.0}, {30.0, 75.0}}) {
         CrackedWood c;
         c.crack = crack * degree;
         c.radial = grain * degree;
         c.remote(1, 1) = 1e5;
-        const double step = 0.5 * 10e-3 / c.cells;
+        c.cells = 20;
+        const double step = 5 * 10e-3 / c.cells;
         double potential[2];
         for (const int k : {0, 1}) {
             c.longer = k == 0 ? -step : step;
@@ -313,11 +319,11 @@ TEST(VerificationOrthotropicCrack, EqualConstantsRunAsIsotropicWood) {
 }
 
 TEST(VerificationOrthotropicCrack, GWhereTheGrainTurns) {
-    // The pith lies 12 mm from the tip: the grain turns by 2.4 degrees a cell, and G carries the turning of the grain explicitly.
-    Scene scene = edge_crack(0.5e-3);
+    // The pith lies 12 mm from the tip: the grain turns by a degree a cell, and G carries its turning explicitly.
+    Scene scene = edge_crack(0.2e-3);
     scene.materials["EW"] = wood();
     scene.specimen.pith = Vec2(6e-3, -2e-3);
-    const double step = 0.25e-3;
+    const double step = 0.1e-3;
     double potential[2];
     for (const int k : {0, 1}) {
         Scene beside = scene;
