@@ -43,6 +43,8 @@ inline constexpr NumberRule transition = not_negative(dimension::length);
 inline constexpr NumberRule youngs_modulus = positive(dimension::pressure);
 inline constexpr NumberRule poisson_ratio{dimension::number, -1, 0.5, true,
                                           "must lie between -1 and 0.5, both excluded"};
+inline constexpr NumberRule orthotropic_poisson_ratio = finite(dimension::number);  // see `broken_rule`
+inline constexpr NumberRule density_exponent = positive(dimension::number);
 inline constexpr NumberRule density = positive(dimension::density);
 inline constexpr NumberRule toughness = positive(dimension::energy_release_rate);
 inline constexpr NumberRule velocity = finite(dimension::velocity);

@@ -82,12 +82,10 @@ class NumberFinder {
         if (material == scene_.materials.end()) {
             fail(fmt::format(": there is no material {}{}", part(1), suggestion(part(1), names_of(scene_.materials))));
         }
-        const IsotropicMaterial& m = material->second;
-        return member({{"E", {&m.youngs_modulus, limits::youngs_modulus}},
-                       {"nu", {&m.poisson_ratio, limits::poisson_ratio}},
-                       {"density", {&m.density, limits::density}},
-                       {"toughness", {&m.toughness, limits::toughness}}},
-                      2);
+        const Material& m = material->second;
+        std::map<std::string, SceneNumber> members = elastic_numbers(m);
+        members.insert({{"density", {&m.density, limits::density}}, {"toughness", {&m.toughness, limits::toughness}}});
+        return member(members, 2);
     }
 
     SceneNumber in_specimen() const {
@@ -100,6 +98,15 @@ class NumberFinder {
                            {"latewood_fraction", {&rings.latewood_fraction, limits::latewood_fraction}},
                            {"transition", {&rings.transition, limits::transition}}},
                           2);
+        }
+        if (part(1) == "density_exponents") {
+            return member(exponent_numbers(scene_.specimen.density_exponents), 2);
+        }
+        if (part(1) == "radial") {
+            if (!scene_.specimen.radial) {
+                fail(": the specimen has no radial");
+            }
+            return member({{"radial", {&*scene_.specimen.radial, limits::rotation}}}, 1);
         }
         if (part(1) == "rotation" && !scene_.specimen.picture && scene_.specimen.file.empty()) {
             fail(": the specimen has neither image nor file");
@@ -179,13 +186,19 @@ void set_number(Scene& scene, const std::string& key, double value) {
     double& slot =
         const_cast<double&>(*number.value);  // the scene is ours to change; finding needs no second, mutable copy
     const double before = std::exchange(slot, value);
-    if (scene.specimen.rings) {
-        try {
+    try {
+        if (scene.specimen.rings) {
             check_rings(*scene.specimen.rings, {file, key}, text);
-        } catch (const InputError&) {
-            slot = before;
-            throw;
         }
+        for (const auto& [name, material] : scene.materials) {
+            const auto broken = material.orthotropic ? broken_rule(*material.orthotropic) : std::nullopt;
+            if (broken) {
+                throw InputError(file, key, text, fmt::format("[materials.{}] {}", name, broken->rule));
+            }
+        }
+    } catch (const InputError&) {
+        slot = before;
+        throw;
     }
 }
 

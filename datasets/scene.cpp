@@ -102,23 +102,6 @@ Model read_model(const Entry& entry) {
     return model;
 }
 
-std::map<std::string, IsotropicMaterial> read_materials(const Entry& materials) {
-    std::map<std::string, IsotropicMaterial> result;
-    for (const auto& [name, entry] : materials.members()) {
-        if (const auto kind = entry.find("kind"); kind && kind->text() != "isotropic") {
-            const std::string choice = kind->choice<std::string>({{"isotropic", "isotropic"},
-                                                                  {"orthotropic", "orthotropic"},
-                                                                  {"viscoelastic", "viscoelastic"},
-                                                                  {"plastic", "plastic"}});
-            kind->fail(fmt::format("a material of kind \"{}\" is not supported yet", choice));
-        }
-        entry.only({"kind", "E", "nu", "density", "toughness"});
-        result[name] = {entry.at("E").number(limits::youngs_modulus), entry.at("nu").number(limits::poisson_ratio),
-                        entry.at("density").number(limits::density), entry.at("toughness").number(limits::toughness)};
-    }
-    return result;
-}
-
 SolverChoice read_solver(const Entry& entry) {
     entry.only({"kind", "shape_function", "damping", "extrapolate"});
     SolverChoice solver;
@@ -183,7 +166,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file, co
         scene.title = title->text();
     }
     scene.model = read_model(root.at("model"));
-    scene.materials = read_materials(root.at("materials"));
+    scene.materials = read_materials(root.at("materials"), scene.model.plane);
     scene.specimen = read_specimen_plan(root.at("specimen"), scene.materials);
     if (scene.model.cell > scene.specimen.size.minCoeff()) {
         root.at("model").at("cell").fail("the cell is larger than the specimen");

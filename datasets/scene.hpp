@@ -63,6 +63,19 @@ struct Picture {
     std::filesystem::path orientation;  // optional second picture; empty: none
 };
 
+/// How the constants of transition wood follow its density between the two classes that it joins: linearly in density^exponent, so
+/// that the law meets both ends. Without an exponent: density^n with the n that joins the ends. Poisson's ratios go linearly.
+/// Defaults for E_R and E_T fit spruce (Jernkvist and Thuvander 2001, Moden and Berglund 2008); E_L and G_RT go with the stretch and
+/// the bend of cell walls (Gibson and Ashby 1997, ch. 10).
+struct DensityExponents {
+    std::optional<double> E;  // of isotropic wood
+    double E_R = 1.0;
+    double E_T = 3.0;
+    double G_RT = 3.0;
+    double E_L = 1.0;
+    std::optional<double> toughness;
+};
+
 struct SpecimenPlan {
     Vec2 size = Vec2::Zero();        // lower left corner at the origin [m]
     std::vector<Shape> cutouts;
@@ -72,14 +85,41 @@ struct SpecimenPlan {
     std::filesystem::path file;      // a Specimen in HDF5; uses picture_offset and picture_rotation below
     Vec2 file_offset = Vec2::Zero(); // [m]
     double file_rotation = 0.0;      // [rad]
+    std::optional<double> radial;    // the radial direction, where neither rings nor a map give it: counter-clockwise from +x [rad];
+    std::optional<Vec2> pith;        // or away from here [m]
+    DensityExponents density_exponents;
     std::shared_ptr<const Specimen> map;  // what `picture` or `file` holds, once it has been read
 };
 
-struct IsotropicMaterial {
+/// Elastic constants of wood along its own axes: L along the stem, R from the pith to the bark, T along the rings. The first index of
+/// a Poisson's ratio is the direction of the stress, the second that of the contraction: nu_ij = -strain_j / strain_i under stress
+/// along i, so that nu_ij / E_i = nu_ji / E_j (Kollmann and Cote 1968). Specimens lie in the R-T plane; the L constants count in plane
+/// strain alone.
+struct OrthotropicElasticity {
+    double E_R = 0.0;                // [Pa]
+    double E_T = 0.0;                // [Pa]
+    double G_RT = 0.0;               // [Pa]
+    double nu_RT = 0.0;
+    double E_L = 0.0;                // [Pa]; 0 with nu_LR and nu_LT: not given
+    double nu_LR = 0.0;
+    double nu_LT = 0.0;
+};
+
+struct BrokenRule {
+    std::string key;   // of the constant at fault
+    std::string rule;  // that it breaks, in words
+};
+
+/// The thermodynamic limit that the constants break, if any: strain energy is positive whatever the strain (Lempriere 1968,
+/// nu_ij^2 < E_i / E_j and a positive determinant). Without L constants the limit of the R-T plane alone.
+std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood);
+
+struct Material {
     double youngs_modulus = 0.0;  // E [Pa]
     double poisson_ratio = 0.0;   // nu, -1 < nu < 0.5
     double density = 0.0;         // rho [kg/m^3]
     double toughness = 0.0;       // G_c [J/m^2]
+    std::optional<OrthotropicElasticity> orthotropic = {};  // in place of E and nu
 };
 
 enum class Side { top, bottom, left, right };
@@ -156,7 +196,7 @@ struct Scene {
     std::string title;
     Model model;
     SpecimenPlan specimen;
-    std::map<std::string, IsotropicMaterial> materials;
+    std::map<std::string, Material> materials;
     std::vector<Edge> edges;
     std::vector<Body> bodies;
     std::vector<Crack> cracks;

@@ -12,7 +12,7 @@
 namespace crampfit {
 namespace {
 
-using Materials = std::map<std::string, IsotropicMaterial>;
+using Materials = std::map<std::string, Material>;
 
 void check_material(const Entry& entry, const std::string& name, const Materials& materials) {
     if (!materials.contains(name)) {
@@ -120,6 +120,66 @@ Picture read_picture_plan(const Entry& specimen, const Materials& materials) {
     return picture;
 }
 
+/// Reads the keys that the scene gives; the others keep their defaults.
+DensityExponents read_density_exponents(const Entry& entry) {
+    entry.only({"E", "E_R", "E_T", "G_RT", "E_L", "toughness"});
+    DensityExponents exponents;
+    const auto read = [&](const char* key, auto& exponent) {
+        if (const auto given = entry.find(key)) {
+            exponent = given->number(limits::density_exponent);
+        }
+    };
+    read("E", exponents.E);
+    read("E_R", exponents.E_R);
+    read("E_T", exponents.E_T);
+    read("G_RT", exponents.G_RT);
+    read("E_L", exponents.E_L);
+    read("toughness", exponents.toughness);
+    return exponents;
+}
+
+/// The radial direction by `radial` or `pith`, where nothing else gives it.
+void read_radial_direction(const Entry& specimen, SpecimenPlan& plan) {
+    for (const char* key : {"radial", "pith"}) {
+        if (specimen.has(key) && plan.rings) {
+            specimen.at(key).fail("the rings have a pith of their own, which gives the radial direction");
+        }
+        if (specimen.has(key) && plan.picture && !plan.picture->orientation.empty()) {
+            specimen.at(key).fail("the picture in `orientation` gives the radial direction already");
+        }
+    }
+    if (specimen.has("radial") && specimen.has("pith")) {
+        specimen.at("pith").fail("give one of radial and pith");
+    }
+    if (const auto radial = specimen.find("radial")) {
+        plan.radial = radial->number(limits::rotation);
+    }
+    if (const auto pith = specimen.find("pith")) {
+        plan.pith = pith->point();
+    }
+}
+
+/// Orthotropic wood needs a radial direction. A specimen's file may hold one: that is seen when it is read.
+void check_radial_direction(const Entry& source, const SpecimenPlan& plan, const Materials& materials) {
+    if (plan.rings || plan.radial || plan.pith || !plan.file.empty() || (plan.picture && !plan.picture->orientation.empty())) {
+        return;
+    }
+    std::vector<std::string> used{plan.material};
+    if (plan.picture) {
+        used.clear();
+        for (const GrayClass& gray_class : plan.picture->classes) {
+            used.push_back(gray_class.material);
+        }
+    }
+    for (const std::string& name : used) {
+        if (materials.at(name).orthotropic) {
+            source.fail(fmt::format("[materials.{}] is orthotropic: give its radial direction, as specimen.radial = \"30 deg\", "
+                                    "specimen.pith, or a picture of angles in specimen.orientation",
+                                    name));
+        }
+    }
+}
+
 /// Which of the four ways to say what the specimen is made of was used; exactly one must be.
 std::string specimen_source(const Entry& specimen) {
     std::string source;
@@ -154,6 +214,21 @@ void check_picture_keys(const Entry& specimen, const std::string& source) {
 
 }  // namespace
 
+std::map<std::string, SceneNumber> exponent_numbers(const DensityExponents& exponents) {
+    constexpr NumberRule rule = limits::density_exponent;
+    std::map<std::string, SceneNumber> numbers{{"E_R", {&exponents.E_R, rule}},
+                                               {"E_T", {&exponents.E_T, rule}},
+                                               {"G_RT", {&exponents.G_RT, rule}},
+                                               {"E_L", {&exponents.E_L, rule}}};
+    if (exponents.E) {
+        numbers.insert({"E", {&*exponents.E, rule}});
+    }
+    if (exponents.toughness) {
+        numbers.insert({"toughness", {&*exponents.toughness, rule}});
+    }
+    return numbers;
+}
+
 void check_rings(const Rings& rings, const Place& place, const std::string& value) {
     constexpr double rounding = 1e-12;  // of decimals
     if (rings.transition + rings.latewood_fraction * rings.period > rings.period * (1 + rounding)) {
@@ -171,7 +246,7 @@ Shape read_shape(const Entry& parent) {
 
 SpecimenPlan read_specimen_plan(const Entry& specimen, const Materials& materials) {
     specimen.only({"size", "cutouts", "material", "rings", "image", "file", "pixel", "offset", "rotation", "classes",
-                   "orientation", "between"});
+                   "orientation", "between", "radial", "pith", "density_exponents"});
     SpecimenPlan plan;
     const std::vector<Entry> size = specimen.at("size").list(2, "two lengths, such as [\"10 mm\", \"10 mm\"]");
     plan.size = {size[0].number(limits::size), size[1].number(limits::size)};
@@ -196,6 +271,11 @@ SpecimenPlan read_specimen_plan(const Entry& specimen, const Materials& material
         plan.file_offset = read_offset(specimen);
         plan.file_rotation = read_rotation(specimen);
     }
+    if (const auto exponents = specimen.find("density_exponents")) {
+        plan.density_exponents = read_density_exponents(*exponents);
+    }
+    read_radial_direction(specimen, plan);
+    check_radial_direction(entry, plan, materials);
     return plan;
 }
 

@@ -1,6 +1,7 @@
 #include "forward/cracks.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/near_tip_field.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -190,7 +191,12 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         // The wood that counts is where the tip is, on the way, when it frees the pair.
         const bool at_end = (x - lines[k].end.position).squaredNorm() <= (x - lines[k].start.position).squaredNorm();
         const Vec2 on_the_way = x + tip_lag * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
-        const double plane_modulus = materials_->average(on_the_way, 0.5 * body_->layout.cell).plane_modulus();
+        const LocalWood wood = materials_->average(on_the_way, 0.5 * body_->layout.cell);
+        // What counts in orthotropic wood is how it opens: G = K_I^2 / E'.
+        const double plane_modulus =
+            materials_->orthotropic() && wood.filled > 0.0
+                ? 1.0 / near_tip_field(wood.elasticity.stiffness(), lines[k].tip(at_end).direction).release()(0, 0)
+                : wood.plane_modulus();
         const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
         pairs.push_back({own_is_left ? own : other, own_is_left ? other : own, node, k,
                          left_of(lines[k].direction_near(true, x)), plane_modulus, 0.0});

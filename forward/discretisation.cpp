@@ -57,6 +57,14 @@ class Cutouts {
     std::vector<Box> boxes_;
 };
 
+// Stress zz per stress xx, yy, xy in plane strain.
+Eigen::Vector3d stress_out_of_plane(const LocalWood& wood) {
+    const Vec2& n = wood.elasticity.normal;
+    const double across = wood.poisson_ratios[0], along = wood.poisson_ratios[1];
+    return {across * n.x() * n.x() + along * n.y() * n.y(), across * n.y() * n.y() + along * n.x() * n.x(),
+            2.0 * (across - along) * n.x() * n.y()};
+}
+
 } // namespace
 
 Layout Layout::of(const Scene& scene) {
@@ -92,15 +100,30 @@ Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials)
 }
 
 void Discretisation::mark_changes() {
-    points.changes.assign(points.count(), 0);
+    points.changes.assign(points.count(), Change::none);
     for (int p = 0; p < points.count(); ++p) {
         for (const auto& [step_x, step_y] : {std::pair{0, -1}, {1, 0}, {0, 1}, {-1, 0}}) {
             const int other = neighbour(p, step_x, step_y);
-            if (other < 0) continue;
-            const Eigen::Vector4d change = points.layers[other] - points.layers[p];
-            if (change.cwiseQuotient(points.layers[p]).cwiseAbs().maxCoeff() > 1e-9) points.changes[p] = 1;
+            if (other >= 0) points.changes[p] = std::max(points.changes[p], change_between(p, other));
         }
     }
+}
+
+Change Discretisation::change_between(int p, int other) const {
+    constexpr double rounding = 1e-9;
+    if (!points.layers.empty()) {
+        const Eigen::Vector4d change = points.layers[other] - points.layers[p];
+        return change.cwiseQuotient(points.layers[p]).cwiseAbs().maxCoeff() > rounding ? Change::wood : Change::none;
+    }
+    // The two linear invariants of a plane stiffness do not feel the grain's direction. Averaged over a cell, grain that turns
+    // changes them by the square of its turn within the cell, which is no other wood.
+    constexpr double no_other_wood = 0.01;
+    const Eigen::Matrix3d here = points.stiffness_of(p), there = points.stiffness_of(other);
+    const double bulk = here(0, 0) + here(1, 1) + 2.0 * here(0, 1), shear = here(0, 0) + here(1, 1) - 2.0 * here(0, 1) + 4.0 * here(2, 2);
+    const double other_bulk = there(0, 0) + there(1, 1) + 2.0 * there(0, 1);
+    const double other_shear = there(0, 0) + there(1, 1) - 2.0 * there(0, 1) + 4.0 * there(2, 2);
+    if (std::abs(other_bulk - bulk) > no_other_wood * bulk || std::abs(other_shear - shear) > no_other_wood * shear) return Change::wood;
+    return (there - here).norm() > rounding * here.norm() ? Change::grain : Change::none;
 }
 
 void Discretisation::place_points(const Scene& scene, const MaterialMap& materials) {
@@ -115,6 +138,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         // and layers that share it would act too stiff across (the ring specimen at 0.1 mm cells is 0.6 % too stiff by points
         // and 0.3 % by cells).
         const LocalWood wood = materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
+        const Eigen::Matrix3d C = wood.elasticity.stiffness();
         for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
             const int column = c % layout.cells_x * layout.per_side + slot % layout.per_side;
             const int row = c / layout.cells_x * layout.per_side + slot / layout.per_side;
@@ -127,13 +151,13 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
             points.cell.push_back(c);
             points.slot.push_back(static_cast<std::uint8_t>(slot));
             points.node.push_back(layout.cell_nodes(c));
-            const Eigen::Matrix3d C = wood.elasticity.stiffness();
             const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
             for (int k = 0; k < 6; ++k) points.stiffness[k].push_back(constants[k]);
-            if (!materials.homogeneous()) points.layers.push_back(wood.elasticity.coefficients);
+            if (!materials.homogeneous() && !materials.orthotropic()) points.layers.push_back(wood.elasticity.coefficients.head<4>());
             points.volume.push_back(share * size.prod() * layout.thickness);
             points.mass.push_back(wood.density * points.volume.back());
-            points.poisson_ratio.push_back(wood.poisson_ratio);
+            if (materials.orthotropic()) points.out_of_plane.push_back(stress_out_of_plane(wood));
+            else points.poisson_ratio.push_back(wood.poisson_ratios[0]);
             points.latewood.push_back(static_cast<float>(wood.latewood));
         }
     }

@@ -41,6 +41,9 @@ struct Layout {
     int cell_at(const Vec2& x) const;
 };
 
+/// How the wood differs between neighbouring points: not at all, by the direction of its grain alone, or in its constants.
+enum class Change : std::uint8_t { none, grain, wood };
+
 /// Material points in the undeformed specimen, in cell order: those of cell c are first_of_cell[c] .. first_of_cell[c + 1]. What
 /// a cutout takes of a point's domain is taken off its volume.
 struct Points {
@@ -49,12 +52,13 @@ struct Points {
     std::vector<std::uint8_t> slot;          // which place in its cell, row by row
     std::vector<std::array<int, 4>> node;    // the velocity fields it belongs to at its cell's four nodes
     std::array<std::vector<double>, 6> stiffness;  // stress from strain: xx,xx; xx,yy; yy,yy; xy,xy; xx,xy; yy,xy [Pa]
-    std::vector<Eigen::Vector4d> layers;     // coefficients of LayeredElasticity; empty where all wood is the same
+    std::vector<Eigen::Vector4d> layers;     // coefficients of LayeredElasticity; empty where all wood is the same or some orthotropic
     std::vector<double> volume;              // [m^3]
     std::vector<double> mass;                // [kg]
-    std::vector<double> poisson_ratio;       // for the stress out of the plane
+    std::vector<double> poisson_ratio;       // for the stress out of the plane; empty where some wood is orthotropic
+    std::vector<Eigen::Vector3d> out_of_plane;  // there: stress zz per stress xx, yy, xy in plane strain
     std::vector<float> latewood;             // 0..1, for pictures
-    std::vector<std::uint8_t> changes;       // 1 where the wood differs from a neighbouring point's; empty: nowhere
+    std::vector<Change> changes;             // from a neighbouring point to this one; empty: nowhere
     std::vector<int> first_of_cell;          // [cells + 1]
     std::vector<int> lattice;                // [rows x columns of point places] point there, or -1
 
@@ -118,6 +122,7 @@ class Discretisation {
 
   private:
     void mark_changes();
+    Change change_between(int p, int other) const;
     void place_points(const Scene& scene, const MaterialMap& materials);
     int point_beside(const Vec2& x) const;
     void add_facet(int p, const Vec2& position, double length, const Vec2& normal);

@@ -16,23 +16,45 @@ namespace {
 //
 // At a sharp boundary with normal n the strain e_nn jumps, so that the explicit derivative of W(strain) has no meaning there.
 // Its Legendre transform in what the boundary leaves continuous (e_ss, s_nn, s_ns),
-//     Y = W - s_nn e_nn - s_ns g_ns = 1/2 [E' e_ss^2 + 2 r s_nn e_ss - a s_nn^2 - b s_ns^2]
-// (LayeredElasticity) has the same explicit derivative where the wood is smooth, and gives Eshelby's jump [W] - t.[u,n] where it
-// is not.
+//     Y = W - s_nn e_nn - s_ns g_ns
+// (LayeredElasticity), has the same explicit derivative where the wood is smooth, and gives Eshelby's jump [W] - t.[u,n] where it
+// is not. The coefficients of isotropic wood are the same for all n, those of orthotropic wood are found for the n at hand.
 class WoodGradient {
   public:
     WoodGradient(const Discretisation& body, int p) {
         const Points& points = body.points;
+        std::array<std::array<int, 2>, 2> sides;  // behind and ahead along x and y
+        Vec2 distance = Vec2::Zero();
         for (int axis = 0; axis < 2; ++axis) {
             int before = body.neighbour(p, axis == 0 ? -1 : 0, axis == 0 ? 0 : -1);
             int after = body.neighbour(p, axis == 0 ? 1 : 0, axis == 0 ? 0 : 1);
             const int steps = (before >= 0) + (after >= 0);
-            if (steps == 0) continue;
             if (before < 0) before = p;
             if (after < 0) after = p;
-            const Eigen::Vector4d change = points.layers[after] - points.layers[before];
-            coefficients_.col(axis) = change / (steps * body.layout.point_size()[axis]);
-            density[axis] = (points.density(after) - points.density(before)) / (steps * body.layout.point_size()[axis]);
+            sides[axis] = {before, after};
+            distance[axis] = std::max(steps, 1) * body.layout.point_size()[axis];
+            density[axis] = (points.density(after) - points.density(before)) / distance[axis];
+        }
+        const auto differences = [&](const auto& value) {
+            for (int axis = 0; axis < 2; ++axis)
+                coefficients_.col(axis) = (value(sides[axis][1]) - value(sides[axis][0])) / distance[axis];
+        };
+        if (!points.layers.empty()) {
+            differences([&](int q) {
+                LayeredElasticity::Coefficients c = LayeredElasticity::Coefficients::Zero();
+                c.head<4>() = points.layers[q];
+                return c;
+            });
+            const Vec2 steepest = coefficients_.row(0).transpose();
+            if (!steepest.isZero()) normal_ = steepest.normalized();
+        } else {
+            std::array<Eigen::Matrix3d, 2> slope;
+            for (int axis = 0; axis < 2; ++axis)
+                slope[axis] = (points.stiffness_of(sides[axis][1]) - points.stiffness_of(sides[axis][0])) / distance[axis];
+            const auto product = [&](int i, int j) { return slope[i].cwiseProduct(slope[j]).sum(); };
+            const double angle = 0.5 * std::atan2(2.0 * product(0, 1), product(0, 0) - product(1, 1));
+            normal_ = {std::cos(angle), std::sin(angle)};
+            differences([&](int q) { return layered(points.stiffness_of(q), normal_).coefficients; });
         }
     }
 
@@ -40,19 +62,18 @@ class WoodGradient {
 
     // Explicit gradient of the strain energy density [J/m^4].
     Vec2 of_energy(const PointState& state) const {
-        const Vec2 steepest = coefficients_.row(0).transpose();
-        if (steepest.isZero()) return Vec2::Zero();
-        const Vec2 n = steepest.normalized();
-        const Vec2 s = left_of(n);
+        const Vec2 s = left_of(normal_);
         const double e_ss = s.dot(state.strain * s);
-        const double s_nn = n.dot(state.stress * n);
-        const double s_ns = s.dot(state.stress * n);
-        const Eigen::Vector4d factors(0.5 * e_ss * e_ss, s_nn * e_ss, -0.5 * s_nn * s_nn, -0.5 * s_ns * s_ns);
+        const double s_nn = normal_.dot(state.stress * normal_);
+        const double s_ns = s.dot(state.stress * normal_);
+        LayeredElasticity::Coefficients factors;
+        factors << 0.5 * e_ss * e_ss, s_nn * e_ss, -0.5 * s_nn * s_nn, -0.5 * s_ns * s_ns, s_ns * e_ss, -s_nn * s_ns;
         return coefficients_.transpose() * factors;
     }
 
   private:
-    Eigen::Matrix<double, 4, 2> coefficients_ = Eigen::Matrix<double, 4, 2>::Zero();  // [per m]
+    Eigen::Matrix<double, 6, 2> coefficients_ = Eigen::Matrix<double, 6, 2>::Zero();  // [per m]
+    Vec2 normal_ = Vec2::UnitX();  // in which the wood changes most
 };
 
 // The virtual extension at the nodes of one cell, and how far it reaches.
@@ -88,7 +109,7 @@ class Extension {
         double nearest = reach;
         body_.for_cells_near(tip, reach, [&](int c) {
             for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p)
-                if (body_.points.changes[p]) nearest = std::min(nearest, (body_.points.position[p] - tip).norm());
+                if (body_.points.changes[p] == Change::wood) nearest = std::min(nearest, (body_.points.position[p] - tip).norm());
         });
         return nearest;
     }
@@ -143,7 +164,7 @@ double energy_release_rate(const Discretisation& body, const Vec2& tip, const Ex
         double integrand = (state.stress.transpose() * u_gradient).cwiseProduct(q_gradient.transpose()).sum() -
                            (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
                            density * (a.dot(u_gradient * q) - v.dot(v_gradient * q));
-        if (!points.changes.empty() && points.changes[p]) {
+        if (!points.changes.empty() && points.changes[p] != Change::none) {
             const WoodGradient wood(body, p);
             integrand -= (wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density).dot(q);
         }
@@ -230,18 +251,15 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // K_I and K_II by the interaction integral (Yau, Wang and Corten 1980), in the incompatibility form for wood that changes from
 // place to place (Dolbow and Gosz 2002; Kim and Paulino 2005):
 //     M = int [ (s_ij a_i,k + t_ij u_i,k - t_mn e_mn d_kj) q_k,j + (S_ijmn s_mn t_ij,k - e_ij t_ij,k + rho u_i,tt a_i,k) q_k ] dA
-// with a, t the near-tip displacement and stress of unit K in isotropic wood of compliance S, that at the tip; K = E' M / 2. No
-// derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen from the frame
-// that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
+// with a, t the near-tip displacement and stress of unit K in wood of compliance S, that at the tip; G = K^T H K gives
+// K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen
+// from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
 // Left out: tractions on closed faces, the speed of a running tip in a and t, and the traction that t puts on the faces of a crack
 // that bends within the domain.
-Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const LocalWood& wood,
+Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
                        const Extension& extension, const NodalState& nodal, bool rotates) {
     const Points& points = body.points;
     const CrackTip& tip = line.tip(at_end);
-    const double E = wood.plane_modulus();
-    const double nu = wood.elasticity.coefficients[1];  // of the plane problem
-    const std::array<NearTipField, 2> modes{NearTipField(1.0, 0.0, E, nu), NearTipField(0.0, 1.0, E, nu)};
     const Mat2 turn = mean_turn(body, tip.position, extension, nodal);
     const double closest = 0.25 * body.layout.point_size().minCoeff();  // a point may lie on the tip itself
     Mat2 axes;
@@ -255,9 +273,13 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
         const Seen s = fixed.in(axes);
         const double r = std::max(closest, (points.position[p] - tip.position).norm());
         const double angle = angle_from_tip(line, at_end, points.position[p]);
-        const Mat2 other_wood = ((1.0 + nu) * s.stress - nu * s.stress.trace() * Mat2::Identity()) / E - s.strain;
+        const Eigen::Vector3d there = field.strain(s.stress);
+        Mat2 other_wood;
+        other_wood << there[0], 0.5 * there[2], 0.5 * there[2], there[1];
+        other_wood -= s.strain;
+        const std::array<NearTipField::Mode, 2> modes = field.at(r, angle);
         for (int mode = 0; mode < 2; ++mode) {
-            const NearTipField::At near = modes[mode].at(r, angle);
+            const NearTipField::Mode& near = modes[mode];
             const Mat2 works = near.gradient.transpose() * s.stress + s.gradient.transpose() * near.stress;
             double integrand = works.cwiseProduct(s.q_gradient).sum() -
                                near.stress.cwiseProduct(s.strain).sum() * s.q_gradient.trace() + s.inertia.dot(near.gradient * s.q);
@@ -266,7 +288,7 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
             sum[mode] += integrand * points.volume[p];
         }
     });
-    return 0.5 * E / body.layout.thickness * sum;
+    return 0.5 / body.layout.thickness * field.release().inverse() * sum;
 }
 
 // True where the cell that holds x is made of the wood at x alone.
@@ -292,12 +314,16 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     load.G = energy_release_rate(body, tip.position, extension, state, options.rotates);
     load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
 
-    const Vec2 K = intensity_factors(body, line, at_end, wood, extension, state, options.rotates);
+    const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
+    const Vec2 K = intensity_factors(body, line, at_end, field, extension, state, options.rotates);
     load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
     load.K_II = K[1];
     // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: with
     // the tip 3 cells off a boundary J is 7 % low (ring specimen against finite elements) and K^2 / E' is within 1 %.
-    if (extension.meets_other_wood && in_one_wood(body, materials, tip.position)) load.G = K.squaredNorm() / materials.at(tip.position).plane_modulus();
+    if (extension.meets_other_wood && in_one_wood(body, materials, tip.position)) {
+        const Mat2 H = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction).release();
+        load.G = K.dot(H * K);
+    }
     return load;
 }
 

@@ -172,10 +172,9 @@ void ExplicitSolver::grow_cracks() {
             TipLoad& load = tip_loads_[2 * k + at_end];
             load = load_at(k, at_end);
             if (load.G < load.toughness) continue;
-            // A crack cannot outrun the Rayleigh wave (Freund 1990); Viktorov's fit for its speed.
+            // A crack cannot outrun the Rayleigh wave (Freund 1990).
             const LocalWood wood = materials_.at(tip.position);
-            const double nu = wood.poisson_ratio;
-            const double rayleigh = (0.862 + 1.14 * nu) / (1.0 + nu) * std::sqrt(wood.shear_modulus() / wood.density);
+            const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
             double& last = last_growth_[2 * k + at_end];
             if (time_ - last < increment / rayleigh) continue;
             last = time_;

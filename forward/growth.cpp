@@ -1,5 +1,7 @@
 #include "forward/growth.hpp"
 
+#include "forward/near_tip_field.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -27,34 +29,50 @@ double toughness_along(const MaterialMap& materials, const Vec2& from, const Vec
     return sum / samples;
 }
 
-// The angle with the largest G / G_c, both of a short branch: of all whole degrees, then of the parabola through its neighbours.
-double weakest_angle(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
-    constexpr int most = 80;  // [degrees] as far as `branch_intensities` is good
+// Where a function of the angle is largest: of all whole degrees up to `most`, then of the parabola through its neighbours [rad].
+template <class Function>
+double largest_at(int most, Function function) {
     constexpr double degree = std::numbers::pi / 180.0;
-    const double least_toughness = 1e-3 * load.toughness;  // a void has none: it draws the crack, but the ratio stays finite
-    const auto ratio = [&](double angle) {
-        const Vec2 K = branch_intensities(angle, load.K_I, load.K_II);
-        const double opening = std::max(0.0, K[0]);  // a branch whose faces touch has no mode I
-        const Vec2 way = increment * turned(tip.direction, angle);
-        const double toughness = materials.homogeneous() ? load.toughness : toughness_along(materials, tip.position, way);
-        return (opening * opening + K[1] * K[1]) / std::max(least_toughness, toughness);
-    };
     int best = 0;
-    double largest = ratio(0.0);
+    double largest = function(0.0);
     for (const int sense : {1, -1}) {
         for (int k = 1; k <= most; ++k) {
-            const double here = ratio(sense * k * degree);
+            const double here = function(sense * k * degree);
             if (here <= largest) continue;
             largest = here;
             best = sense * k;
         }
     }
-    const double before = ratio((best - 1) * degree);
-    const double after = ratio((best + 1) * degree);
+    const double before = function((best - 1) * degree);
+    const double after = function((best + 1) * degree);
     const double bend = before - 2.0 * largest + after;
     if (std::abs(best) == most || bend >= 0.0) return best * degree;
     const double refined = (best + 0.5 * (before - after) / bend) * degree;
-    return ratio(refined) > largest ? refined : best * degree;
+    return function(refined) > largest ? refined : best * degree;
+}
+
+// The angle with the largest G / G_c, both of a short branch.
+double weakest_angle(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
+    constexpr int most = 80;  // [degrees] as far as `branch_intensities` is good
+    const double least_toughness = 1e-3 * load.toughness;  // a void has none: it draws the crack, but the ratio stays finite
+    return largest_at(most, [&](double angle) {
+        const Vec2 K = branch_intensities(angle, load.K_I, load.K_II);
+        const double opening = std::max(0.0, K[0]);  // a branch whose faces touch has no mode I
+        const Vec2 way = increment * turned(tip.direction, angle);
+        const double toughness = materials.homogeneous() ? load.toughness : toughness_along(materials, tip.position, way);
+        return (opening * opening + K[1] * K[1]) / std::max(least_toughness, toughness);
+    });
+}
+
+// In orthotropic wood: of the near-tip field itself.
+double hoop_stress_angle(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials) {
+    constexpr int most = 150;  // [degrees]
+    const NearTipField field = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction);
+    return largest_at(most, [&](double angle) {
+        const auto modes = field.at(1.0, angle);
+        const Vec2 across(-std::sin(angle), std::cos(angle));
+        return across.dot((load.K_I * modes[0].stress + load.K_II * modes[1].stress) * across);
+    });
 }
 
 } // namespace
@@ -93,7 +111,10 @@ Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipL
     switch (criterion) {
         case GrowthDirection::straight: return tip.direction;
         case GrowthDirection::normal_to_opening: return normal_to_opening(tip, load.opening);
-        case GrowthDirection::hoop_stress: return turned(tip.direction, hoop_stress_angle(load.K_I, load.K_II)).normalized();
+        case GrowthDirection::hoop_stress: {
+            const double angle = materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);
+            return turned(tip.direction, angle).normalized();
+        }
         case GrowthDirection::energy_release_rate:
             return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
     }

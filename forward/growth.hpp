@@ -6,7 +6,7 @@ namespace crampfit {
 
 /// Angles are counted counter-clockwise from the direction of the crack ahead [rad].
 
-/// Where the hoop stress around a tip is largest; 0 for a tip without load.
+/// Where the hoop stress around a tip in isotropic wood is largest; 0 for a tip without load.
 double hoop_stress_angle(double K_I, double K_II);
 
 /// K_I and K_II at the tip of a short straight branch that leaves a tip with these at an angle of up to 80 degrees [Pa sqrt(m)].

@@ -1,53 +1,48 @@
 #include "forward/material_map.hpp"
 
+#include "forward/geometry.hpp"
+#include "forward/transition_wood.hpp"
+
+#include "datasets/error.hpp"
+
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <type_traits>
 
 namespace crampfit {
 
-PlaneElasticity plane_elasticity(double youngs_modulus, double poisson_ratio, PlaneCondition plane) {
-    const double mu = youngs_modulus / (2.0 * (1.0 + poisson_ratio));
-    const double lambda = youngs_modulus * poisson_ratio / ((1.0 + poisson_ratio) * (1.0 - 2.0 * poisson_ratio));
-    return {plane == PlaneCondition::strain ? lambda : 2.0 * lambda * mu / (lambda + 2.0 * mu), mu};
-}
-
 namespace {
 
-// The direction in which values on a square lattice change most: the first axis of their structure tensor.
-Vec2 steepest(const std::vector<double>& value, int side) {
-    Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
-    for (int j = 0; j + 1 < side; ++j) {
-        for (int i = 0; i + 1 < side; ++i) {
-            const double* at = &value[static_cast<std::size_t>(j) * side + i];
-            const Vec2 slope(at[1] + at[side + 1] - at[0] - at[side], at[side] + at[side + 1] - at[0] - at[1]);
-            tensor += slope * slope.transpose();
-        }
-    }
-    // Angle of the first axis of a symmetric matrix.
+// The first axis of a symmetric matrix.
+Vec2 first_axis(const Eigen::Matrix2d& tensor) {
     const double angle = 0.5 * std::atan2(2.0 * tensor(0, 1), tensor(0, 0) - tensor(1, 1));
     return {std::cos(angle), std::sin(angle)};
 }
 
+// The direction in which values on a square lattice, numbers or matrices, change most: the first axis of their structure tensor.
+template <class Value>
+Vec2 steepest(const std::vector<Value>& value, int side) {
+    const auto product = [](const Value& a, const Value& b) {
+        if constexpr (std::is_same_v<Value, double>) return a * b;
+        else return a.cwiseProduct(b).sum();
+    };
+    Eigen::Matrix2d tensor = Eigen::Matrix2d::Zero();
+    for (int j = 0; j + 1 < side; ++j) {
+        for (int i = 0; i + 1 < side; ++i) {
+            const Value* at = &value[static_cast<std::size_t>(j) * side + i];
+            const Value by_x = at[1] + at[side + 1] - at[0] - at[side];
+            const Value by_y = at[side] + at[side + 1] - at[0] - at[1];
+            tensor(0, 0) += product(by_x, by_x);
+            tensor(0, 1) += product(by_x, by_y);
+            tensor(1, 1) += product(by_y, by_y);
+        }
+    }
+    return first_axis(tensor);
+}
+
 } // namespace
-
-LayeredElasticity layered(const PlaneElasticity& isotropic) {
-    const auto& [l, m] = isotropic;
-    const double a = 1.0 / (l + 2.0 * m);
-    return {{4.0 * m * (l + m) * a, l * a, a, 1.0 / m}, Vec2::UnitX()};
-}
-
-Eigen::Matrix3d LayeredElasticity::stiffness() const {
-    const auto& [e, r, a, b] = std::tuple(coefficients[0], coefficients[1], coefficients[2], coefficients[3]);
-    Eigen::Matrix3d across;  // in n, s
-    across << 1.0 / a, r / a, 0, r / a, e + r * r / a, 0, 0, 0, 1.0 / b;
-    const double cc = normal.x() * normal.x();
-    const double ss = normal.y() * normal.y();
-    const double cs = normal.x() * normal.y();
-    Eigen::Matrix3d turn;  // strain nn, ss, 2 ns from strain xx, yy, 2 xy
-    turn << cc, ss, cs, ss, cc, -cs, -2 * cs, 2 * cs, cc - ss;
-    return turn.transpose() * across * turn;
-}
 
 MaterialMap::MaterialMap(const Scene& scene) : scene_(scene) {
     const SpecimenPlan& plan = scene.specimen;
@@ -66,24 +61,63 @@ MaterialMap::MaterialMap(const Scene& scene) : scene_(scene) {
         materials_ = {scene.materials.at(plan.material)};
     }
     for (int k = 0; k < static_cast<int>(materials_.size()); ++k) pure_.push_back(mix(k, k, 0.0));
+    orthotropic_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.orthotropic.has_value(); });
+    if (!orthotropic_) return;
+    check_radial_direction();
+    if (plan.pith) homogeneous_ = false;
+    if (plan.radial)
+        for (LocalWood& wood : pure_) wood.elasticity.normal = {std::cos(*plan.radial), std::sin(*plan.radial)};
+    const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
+    for (int k = 0; graded && k + 1 < static_cast<int>(materials_.size()); ++k) check_transition(k);
+}
+
+void MaterialMap::check_radial_direction() const {
+    const SpecimenPlan& plan = scene_.specimen;
+    const bool given = plan.radial || plan.pith;
+    const bool mapped = plan.map && !plan.map->orientation.empty();
+    if (plan.rings || given != mapped) return;
+    throw InputError(scene_.file.string(), given ? "specimen.radial" : "specimen", plan.file.string(),
+                     given ? "the map of the radial direction in the specimen says it already; leave radial or pith out"
+                           : "orthotropic wood needs its radial direction: give specimen.radial or specimen.pith, or a map of it");
+}
+
+void MaterialMap::check_transition(int first) const {
+    constexpr int steps = 32;
+    for (int k = 1; k < steps; ++k) {
+        const Material wood = transition_wood(materials_[first], materials_[first + 1], scene_.specimen.density_exponents, k / double{steps});
+        const auto broken = wood.orthotropic ? broken_rule(*wood.orthotropic) : std::nullopt;
+        if (broken)
+            throw InputError(scene_.file.string(), "specimen.density_exponents", fmt::format("transition wood of {:.4g} kg/m^3", wood.density),
+                             broken->rule);
+    }
 }
 
 LocalWood MaterialMap::mix(int first, int second, double grade) const {
-    const IsotropicMaterial& a = materials_[first];
-    const IsotropicMaterial& b = materials_[second];
+    const Material material = first == second
+                                  ? materials_[first]
+                                  : transition_wood(materials_[first], materials_[second], scene_.specimen.density_exponents, grade);
     LocalWood wood;
-    wood.density = a.density + grade * (b.density - a.density);
-    // How far along the power law through both ends this density lies; equal densities leave the geometric mean's share.
-    const double log_span = std::log(b.density / a.density);
-    const double share = std::abs(log_span) > 1e-12 ? std::log(wood.density / a.density) / log_span : grade;
-    const double modulus = a.youngs_modulus * std::pow(b.youngs_modulus / a.youngs_modulus, share);
-    wood.toughness = a.toughness * std::pow(b.toughness / a.toughness, share);
-    wood.poisson_ratio = a.poisson_ratio + grade * (b.poisson_ratio - a.poisson_ratio);
-    wood.elasticity = layered(plane_elasticity(modulus, wood.poisson_ratio, scene_.model.plane));
+    wood.density = material.density;
+    wood.toughness = material.toughness;
+    if (material.orthotropic) {
+        wood.elasticity = layered(plane_stiffness(material, scene_.model.plane), Vec2::UnitX());
+        wood.poisson_ratios = {material.orthotropic->nu_LR, material.orthotropic->nu_LT};
+    } else {
+        wood.elasticity = layered(plane_elasticity(material.youngs_modulus, material.poisson_ratio, scene_.model.plane));
+        wood.poisson_ratios.setConstant(material.poisson_ratio);
+    }
     wood.filled = 1.0;
     const double last = std::max<double>(1.0, static_cast<double>(materials_.size()) - 1.0);
     wood.latewood = (first + grade * (second - first)) / last;
     return wood;
+}
+
+// Where a map of it does not say.
+Vec2 MaterialMap::radial_direction(const Vec2& x) const {
+    const SpecimenPlan& plan = scene_.specimen;
+    if (plan.radial) return {std::cos(*plan.radial), std::sin(*plan.radial)};
+    const Vec2 arm = x - (plan.rings ? plan.rings->pith : *plan.pith);
+    return arm.isZero() ? Vec2::UnitX() : Vec2(arm.normalized());
 }
 
 LocalWood MaterialMap::in_rings(const Vec2& x) const {
@@ -107,13 +141,22 @@ LocalWood MaterialMap::in_picture(const Vec2& x) const {
     const int label = map.label[at];
     if (label == Specimen::void_label) return {};
     const double grade = map.grade.empty() ? 0.0 : map.grade[at];
-    return grade > 0.0 ? mix(label, label + 1, grade) : pure_[label];
+    LocalWood wood = grade > 0.0 ? mix(label, label + 1, grade) : pure_[label];
+    if (orthotropic_ && !map.orientation.empty()) {
+        const double c = std::cos(map.orientation[at]), s = std::sin(map.orientation[at]);
+        wood.elasticity.normal = {picture_cos_ * c - picture_sin_ * s, picture_sin_ * c + picture_cos_ * s};
+    } else if (orthotropic_) {
+        wood.elasticity.normal = radial_direction(x);
+    }
+    return wood;
 }
 
 LocalWood MaterialMap::at(const Vec2& x) const {
     if (scene_.specimen.map) return in_picture(x);
-    if (scene_.specimen.rings) return in_rings(x);
-    return pure_[0];
+    if (homogeneous_) return pure_[0];
+    LocalWood wood = scene_.specimen.rings ? in_rings(x) : pure_[0];
+    if (orthotropic_) wood.elasticity.normal = radial_direction(x);
+    return wood;
 }
 
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
@@ -122,6 +165,7 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
     const int samples = std::clamp(fit, 2, 16);
     LocalWood sum;
+    std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
     std::vector<double> modulus(static_cast<std::size_t>(samples) * samples, 0.0);
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
@@ -129,9 +173,10 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
             const LocalWood here = at(centre + place.cwiseProduct(half));
             modulus[static_cast<std::size_t>(j) * samples + i] = here.plane_modulus();
             sum.elasticity.coefficients += here.elasticity.coefficients;
+            if (orthotropic_) elasticities.push_back(here.elasticity);
             sum.density += here.density;
             sum.toughness += here.toughness;
-            sum.poisson_ratio += here.poisson_ratio;
+            sum.poisson_ratios += here.poisson_ratios;
             sum.latewood += here.latewood;
             sum.filled += here.filled;
         }
@@ -139,13 +184,45 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (sum.filled == 0.0) return sum;
     const double share = 1.0 / sum.filled;  // means over what is there; the void only thins the point
     sum.elasticity.coefficients *= share;
-    sum.elasticity.normal = steepest(modulus, samples);
+    if (orthotropic_) average_elasticity(elasticities, samples, sum.elasticity);
+    else sum.elasticity.normal = steepest(modulus, samples);
     sum.density *= share;
     sum.toughness *= share;
-    sum.poisson_ratio *= share;
+    sum.poisson_ratios *= share;
     sum.latewood *= share;
     sum.filled /= static_cast<double>(samples) * samples;
     return sum;
+}
+
+// Samples of a square lattice whose own layers need not run the same way; void has none.
+void MaterialMap::average_elasticity(const std::vector<LayeredElasticity>& samples, int side, LayeredElasticity& mean) const {
+    constexpr double as_good_as_parallel = 0.02;  // sine of an angle; taken for straight its square is lost
+    const LayeredElasticity* first = nullptr;
+    bool alike = true;
+    Eigen::Matrix2d normals = Eigen::Matrix2d::Zero();
+    for (const LayeredElasticity& wood : samples) {
+        if (wood.coefficients[0] == 0.0) continue;
+        if (!first) first = &wood;
+        alike = alike && wood.coefficients == first->coefficients &&
+                std::abs(cross(wood.normal, first->normal)) < as_good_as_parallel;
+        normals += wood.normal * wood.normal.transpose();
+    }
+    if (alike) {
+        mean = {first->coefficients, first_axis(normals)};
+        return;
+    }
+    std::vector<Eigen::Matrix3d> stiffness;
+    for (const LayeredElasticity& wood : samples)
+        stiffness.push_back(wood.coefficients[0] == 0.0 ? Eigen::Matrix3d(Eigen::Matrix3d::Zero()) : wood.stiffness());
+    mean.normal = steepest(stiffness, side);
+    mean.coefficients.setZero();
+    int count = 0;
+    for (const Eigen::Matrix3d& C : stiffness) {
+        if (C(0, 0) == 0.0) continue;
+        mean.coefficients += layered(C, mean.normal).coefficients;
+        ++count;
+    }
+    mean.coefficients /= count;
 }
 
 } // namespace crampfit

@@ -2,63 +2,118 @@
 
 #include "forward/deformation.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
 #include <complex>
 #include <numbers>
 
 namespace crampfit {
 
-/// Elastic field around a tip of a straight crack with free faces in isotropic wood: the first term of Williams (1957), by
-/// Kolosov's potentials phi = A z^1/2, psi = (conj A - A/2) z^1/2, A = (K_I - i K_II) / (2 pi)^1/2 (Muskhelishvili 1953):
-///     2 mu (u + i v) = kappa phi - z conj(phi') - conj(psi),
-///     s_xx + s_yy = 4 Re phi',   s_yy - s_xx + 2 i s_xy = 2 (conj(z) phi'' + psi').
-/// The tip is the origin, x goes ahead of it. Angles beyond +-pi go on smoothly into the other face's side.
+/// Elastic fields around a tip of a straight crack with free faces in wood of any plane compliance, for K_I = 1 and for K_II = 1
+/// [Pa sqrt(m)] (Sih, Paris and Irwin 1965, eqs. 20-23; Lekhnitskii's complex variables z_k = x + s_k y). The tip is the origin, x
+/// goes ahead of it. Angles beyond +-pi go on smoothly into the other face's side.
+///
+/// The published form divides by s_1 - s_2 and fails for isotropic wood, where s_1 = s_2 = i. Here each such quotient is a divided
+/// difference [g] = (g(s_1) - g(s_2)) / (s_1 - s_2), with [f g] = [f] g(s_1) + f(s_2) [g], and for g = z^-1/2
+///     [g] = -y / ((z_1^1/2 + z_2^1/2) z_1^1/2 z_2^1/2),
+/// which holds for equal roots too: there it is the first term of Williams (1957).
 class NearTipField {
   public:
-    /// With E' and nu' = nu in plane stress, nu / (1 - nu) in plane strain.
-    NearTipField(double K_I, double K_II, double plane_modulus, double plane_poisson)
-        : A_(std::complex<double>(K_I, -K_II) / std::sqrt(2.0 * std::numbers::pi)),
-          mu_(plane_modulus / (2.0 * (1.0 + plane_poisson))), kappa_((3.0 - plane_poisson) / (1.0 + plane_poisson)) {}
+    using Complex = std::complex<double>;
 
-    struct At {
-        Mat2 gradient;                    // du_i / dx_j
-        Mat2 stress;                      // [Pa]
+    /// `compliance` in the axes of the crack, x ahead [1/Pa].
+    explicit NearTipField(const Eigen::Matrix3d& compliance) : a_(compliance) {
+        // a11 s^4 - 2 a16 s^3 + (2 a12 + a66) s^2 - 2 a26 s + a22 = 0, for s over the fourth root of a22 / a11.
+        const double size = std::sqrt(std::sqrt(a_(1, 1) / a_(0, 0)));
+        const double share = 1.0 / (a_(0, 0) * size * size);
+        Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
+        companion.diagonal(-1).setOnes();
+        companion.col(3) << -1.0, 2.0 * a_(1, 2) * share / size, -(2.0 * a_(0, 1) + a_(2, 2)) * share, 2.0 * a_(0, 2) * share * size;
+        const Eigen::Vector4cd roots = companion.eigenvalues();
+        int found = 0;
+        for (const Complex& each : roots)
+            if (each.imag() > 0.0 && found < 2) s_[found++] = size * each;
+    }
+
+    struct Mode {
+        Mat2 gradient;                     // du_i / dx_j
+        Mat2 stress;                       // [Pa]
         std::array<Mat2, 2> stress_slope;  // by x and by y [Pa/m]
     };
 
-    At at(double r, double angle) const {
-        using Complex = std::complex<double>;
-        const Complex z = std::polar(r, angle);
-        const Complex root = std::polar(std::sqrt(r), 0.5 * angle);
-        const Complex B = std::conj(A_) - 0.5 * A_;
-        const Complex first = 0.5 / root;  // derivatives of z^1/2
-        const Complex second = -0.5 * first / z;
-        const Complex third = -1.5 * second / z;
-        const Complex i(0.0, 1.0);
-
-        At field;
-        const Complex by_z = kappa_ * A_ * first - std::conj(A_ * first);
-        const Complex by_conjugate = -z * std::conj(A_ * second) - std::conj(B * first);
-        const Complex by_x = (by_z + by_conjugate) / (2.0 * mu_);
-        const Complex by_y = i * (by_z - by_conjugate) / (2.0 * mu_);
-        field.gradient << by_x.real(), by_y.real(), by_x.imag(), by_y.imag();
-        field.stress = stress(A_ * first, std::conj(z) * A_ * second + B * first);
-        const Complex bent = std::conj(z) * A_ * third + B * second;
-        field.stress_slope[0] = stress(A_ * second, A_ * second + bent);
-        field.stress_slope[1] = stress(i * A_ * second, i * (bent - A_ * second));
-        return field;
+    /// Modes I and II.
+    std::array<Mode, 2> at(double r, double angle) const {
+        const double scale = 1.0 / std::sqrt(2.0 * std::numbers::pi);
+        const double x = r * std::cos(angle), y = r * std::sin(angle);
+        const auto& [s1, s2] = s_;
+        const Complex q1 = 1.0 / root(x, y, s1, angle);  // z_k^-1/2
+        const Complex q2 = 1.0 / root(x, y, s2, angle);
+        const Complex q1_cubed = q1 * q1 * q1;
+        const Complex q = -y * q1 * q1 * q2 * q2 / (q1 + q2);  // [q]
+        // dq_k / dx = -q_k^3 / 2 and dq_k / dy = s_k dq_k / dx.
+        const Complex q1_x = -0.5 * q1_cubed;
+        const Complex q_x = -0.5 * q * (q1 * q1 + q1 * q2 + q2 * q2);
+        const Complex q_y = q1_x + s2 * q_x;
+        std::array<Mode, 2> modes;
+        const std::array<Mat2, 2> by_x = stresses(q1_x, q_x), by_y = stresses(s1 * q1_x, q_y), here = stresses(q1, q);
+        // du / dy of mode I is -s_1 s_2 [p q], of mode II -[s p q], with p = a11 s^2 - a16 s + a12.
+        const double a11 = a_(0, 0), a12 = a_(0, 1), a16 = a_(0, 2);
+        const Complex p2 = (a11 * s2 - a16) * s2 + a12;
+        const Complex p = a11 * (s1 + s2) - a16;
+        const Complex sp = a11 * (s1 * s1 + s1 * s2 + s2 * s2) - a16 * (s1 + s2) + a12;
+        const std::array<double, 2> shear{-(s1 * s2 * (p * q1 + p2 * q)).real(), -(sp * q1 + s2 * p2 * q).real()};
+        for (int k = 0; k < 2; ++k) {
+            Mode& mode = modes[k];
+            mode.stress = scale * here[k];
+            mode.stress_slope = {scale * by_x[k], scale * by_y[k]};
+            const Eigen::Vector3d e = strain(mode.stress);
+            mode.gradient << e[0], scale * shear[k], e[2] - scale * shear[k], e[1];
+        }
+        return modes;
     }
+
+    /// H of G = K^T H K (Sih, Paris and Irwin 1965, eqs. 32, 33; |s_1 s_2|^2 = a22 / a11) [1/Pa].
+    Mat2 release() const {
+        const Complex sum = s_[0] + s_[1], product = s_[0] * s_[1];
+        const double across = 0.5 * a_(0, 0) * product.imag();
+        Mat2 H;
+        H << -0.5 * a_(1, 1) * (sum / product).imag(), across, across, 0.5 * a_(0, 0) * sum.imag();
+        return H;
+    }
+
+    /// xx, yy, 2 xy of wood at the tip under this stress.
+    Eigen::Vector3d strain(const Mat2& stress) const { return a_ * Eigen::Vector3d(stress(0, 0), stress(1, 1), stress(0, 1)); }
 
   private:
-    // From (s_xx + s_yy) / 4, of which only the real part counts, and (s_yy - s_xx + 2 i s_xy) / 2.
-    static Mat2 stress(const std::complex<double>& mean, const std::complex<double>& rest) {
-        Mat2 s;
-        s << 2.0 * mean.real() - rest.real(), rest.imag(), rest.imag(), 2.0 * mean.real() + rest.real();
-        return s;
+    // z^1/2, on the sheet of the angle: z and the place itself lie in the same half plane.
+    static Complex root(double x, double y, const Complex& s, double angle) {
+        const Complex z = x + s * y;
+        const double principal = std::arg(z);
+        const double turn = 2.0 * std::numbers::pi;
+        return std::polar(std::sqrt(std::abs(z)), 0.5 * (principal + turn * std::round((angle - principal) / turn)));
     }
 
-    std::complex<double> A_;  // [Pa sqrt(m)]
-    double mu_;               // [Pa]
-    double kappa_;
+    // Both modes' stress times (2 pi)^1/2, with q1 and [q] of q = z^-1/2 or of a derivative of it:
+    //     I: xx = -s_1 s_2 [s q], yy = q_1 - s_1 [q], xy = s_1 s_2 [q];   II: xx = -[s^2 q], yy = -[q], xy = [s q].
+    std::array<Mat2, 2> stresses(const Complex& q1, const Complex& q) const {
+        const auto& [s1, s2] = s_;
+        const Complex sq = q1 + s2 * q, product = s1 * s2;
+        const auto matrix = [](const Complex& xx, const Complex& yy, const Complex& xy) {
+            Mat2 s;
+            s << xx.real(), xy.real(), xy.real(), yy.real();
+            return s;
+        };
+        return {matrix(-product * sq, q1 - s1 * q, product * q), matrix(-(s1 + s2) * q1 - s2 * s2 * q, -q, sq)};
+    }
+
+    Eigen::Matrix3d a_;
+    std::array<Complex, 2> s_;  // roots with positive imaginary part
 };
+
+/// Of wood of this stiffness in x, y, for a crack that runs in this direction.
+inline NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead) {
+    return NearTipField(in_axes(stiffness, ahead).inverse());
+}
 
 } // namespace crampfit

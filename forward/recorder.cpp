@@ -12,9 +12,12 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
         const PointState state = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates);
         const double xx = state.stress(0, 0);
         const double yy = state.stress(1, 1);
-        const double zz = scene.model.plane == PlaneCondition::strain ? points.poisson_ratio[p] * (xx + yy) : 0.0;
+        const double xy = 0.5 * (state.stress(0, 1) + state.stress(1, 0));
+        double zz = 0.0;
+        if (scene.model.plane == PlaneCondition::strain)
+            zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy) : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
         frame.moved.push_back(value_at(body, p, displacement).cast<float>());
-        frame.stress.push_back(Eigen::Vector4d(xx, yy, 0.5 * (state.stress(0, 1) + state.stress(1, 0)), zz).cast<float>());
+        frame.stress.push_back(Eigen::Vector4d(xx, yy, xy, zz).cast<float>());
     }
     return frame;
 }

@@ -82,7 +82,9 @@ struct SlantedCrack {
 
 /// A square of half width 3 a cut out of the infinite plate with a centre crack: its sides carry the exact stress there, so that K
 /// is exactly that of the infinite plate.
-inline Scene slanted_crack(const SlantedCrack& c) {
+/// `exact` is that of the wood, by default isotropic: remote stress, half length, place, all in the crack's axes.
+template <class Exact = decltype(griffith_stress)>
+Scene slanted_crack(const SlantedCrack& c, const Exact& exact = griffith_stress) {
     const double a = c.half_length;
     const double h = a / c.cells;
     const double width = 6.0 * a;
@@ -101,7 +103,7 @@ inline Scene slanted_crack(const SlantedCrack& c) {
             const double fixed = far > 0 ? width : 0.0;
             const Vec2 x = level ? Vec2(middle, fixed) : Vec2(fixed, middle);
             const Vec2 normal = level ? Vec2(0.0, far) : Vec2(far, 0.0);
-            const Mat2 stress = axes * griffith_stress(remote, a, axes.transpose() * (x - centre)) * axes.transpose();
+            const Mat2 stress = axes * exact(remote, a, axes.transpose() * (x - centre)) * axes.transpose();
             Edge edge = pulled("side", side, stress * normal);
             edge.range = {{from, to}};
             scene.edges.push_back(edge);

@@ -10,7 +10,7 @@
 
 namespace crampfit::test {
 
-inline IsotropicMaterial earlywood() { return {40e6, 0.33, 300.0, 100.0}; }
+inline Material earlywood() { return {40e6, 0.33, 300.0, 100.0}; }
 
 inline Edge moving(std::string name, Side side, Vec2 velocity) {
     Edge edge;

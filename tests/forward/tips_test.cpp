@@ -14,34 +14,87 @@ namespace {
 
 // --- The near-tip field
 
+// Plane compliance of isotropic wood in plane stress, and of wood whose axes are turned against the crack.
+std::array<Eigen::Matrix3d, 3> compliances() {
+    Eigen::Matrix3d isotropic, wood;
+    isotropic << 1, -0.4, 0, -0.4, 1, 0, 0, 0, 2.8;
+    wood << 1, -0.6, 0, -0.6, 15, 0, 0, 0, 40;
+    isotropic /= 50e6;
+    wood /= 700e6;
+    const auto turned = [&](double angle) {
+        return Eigen::Matrix3d(from_axes(wood.inverse(), Vec2(std::cos(angle), std::sin(angle))).inverse());
+    };
+    return {isotropic, turned(0.0), turned(0.7)};
+}
+
 TEST(UnitNearTipField, IsElasticBalancedAndFreeOnTheFaces) {
-    const double E = 50e6, nu = 0.4, r = 2e-3, step = 1e-7;
-    for (const auto& [K_I, K_II] : {std::pair{1.0, 0.0}, {0.0, 1.0}}) {
-        const NearTipField field(K_I, K_II, E, nu);
-        const double scale = 1.0 / std::sqrt(2 * std::numbers::pi * r);  // of the stress
-        for (const double angle : {-2.5, -0.7, 0.0, 1.1, 3.0}) {
-            const NearTipField::At here = field.at(r, angle);
-            const Mat2 strain = 0.5 * (here.gradient + here.gradient.transpose());
-            const Mat2 hooke = ((1 + nu) * here.stress - nu * here.stress.trace() * Mat2::Identity()) / E;
-            EXPECT_LT((strain - hooke).norm(), 1e-12 * scale / E);
-            const Vec2 x(r * std::cos(angle), r * std::sin(angle));
-            for (int k = 0; k < 2; ++k) {
-                Vec2 ahead = x, behind = x;
-                ahead[k] += step;
-                behind[k] -= step;
-                const Mat2 slope = (field.at(ahead.norm(), std::atan2(ahead.y(), ahead.x())).stress -
-                                    field.at(behind.norm(), std::atan2(behind.y(), behind.x())).stress) / (2 * step);
-                EXPECT_LT((slope - here.stress_slope[k]).norm(), 1e-6 * scale / r);
+    const double r = 2e-3, step = 1e-7, scale = 1.0 / std::sqrt(2 * std::numbers::pi * r);  // of the stress
+    for (const Eigen::Matrix3d& compliance : compliances()) {
+        const NearTipField field(compliance);
+        for (const int mode : {0, 1}) {
+            for (const double angle : {-2.5, -0.7, 0.0, 1.1, 3.0, 3.3, -3.5}) {
+                const NearTipField::Mode here = field.at(r, angle)[mode];
+                const Mat2& g = here.gradient;
+                const Eigen::Vector3d strain(g(0, 0), g(1, 1), g(0, 1) + g(1, 0));
+                EXPECT_LT((strain - field.strain(here.stress)).norm(), 1e-12 * scale * compliance.norm());
+                const Vec2 x(r * std::cos(angle), r * std::sin(angle));
+                const auto beside = [&](int axis, double way) {
+                    Vec2 there = x;
+                    there[axis] += way;
+                    const double turn = std::atan2(cross(x, there), x.dot(there));
+                    return field.at(there.norm(), angle + turn)[mode];
+                };
+                for (int k = 0; k < 2; ++k) {
+                    const Mat2 slope = (beside(k, step).stress - beside(k, -step).stress) / (2 * step);
+                    EXPECT_LT((slope - here.stress_slope[k]).norm(), 1e-6 * here.stress_slope[k].norm());
+                }
+                // Compatible: the gradient is that of a displacement.
+                const Mat2 by_x = (beside(0, step).gradient - beside(0, -step).gradient) / (2 * step);
+                const Mat2 by_y = (beside(1, step).gradient - beside(1, -step).gradient) / (2 * step);
+                EXPECT_LT((by_x.col(1) - by_y.col(0)).norm(), 1e-6 * by_x.norm());
+                const Vec2 balance = here.stress_slope[0].col(0) + here.stress_slope[1].col(1);
+                EXPECT_LT(balance.norm(), 1e-12 * here.stress_slope[0].norm());
             }
-            const Vec2 balance = here.stress_slope[0].col(0) + here.stress_slope[1].col(1);
-            EXPECT_LT(balance.norm(), 1e-12 * scale / r);
+            for (const double face : {-1.0, 1.0})
+                EXPECT_LT((field.at(r, face * std::numbers::pi)[mode].stress * Vec2(0, 1)).norm(), 1e-12 * scale);
+            // Ahead of the tip s_yy = K_I / (2 pi r)^1/2 and s_xy = K_II / (2 pi r)^1/2: what K means.
+            const Mat2 ahead = field.at(r, 0.0)[mode].stress;
+            EXPECT_NEAR(ahead(1, 1), (1 - mode) * scale, 1e-12 * scale);
+            EXPECT_NEAR(ahead(0, 1), mode * scale, 1e-12 * scale);
         }
-        for (const double face : {-1.0, 1.0})
-            EXPECT_LT((field.at(r, face * std::numbers::pi).stress * Vec2(0, 1)).norm(), 1e-12 * scale);
-        // Ahead of the tip s_yy = K_I / (2 pi r)^1/2 and s_xy = K_II / (2 pi r)^1/2: what K means.
-        const Mat2 ahead = field.at(r, 0.0).stress;
-        EXPECT_NEAR(ahead(1, 1), K_I * scale, 1e-12 * scale);
-        EXPECT_NEAR(ahead(0, 1), K_II * scale, 1e-12 * scale);
+    }
+}
+
+TEST(UnitNearTipField, IsWilliamsFieldInIsotropicWood) {
+    // Williams 1957, first term: s_xx, s_yy, s_xy of mode I and mode II.
+    const NearTipField field(compliances()[0]);
+    for (const double t : {-3.0, -1.0, 0.2, 2.0}) {
+        const double c = std::cos(t / 2), s = std::sin(t / 2), c3 = std::cos(1.5 * t), s3 = std::sin(1.5 * t);
+        Mat2 one, two;
+        one << c * (1 - s * s3), c * s * c3, c * s * c3, c * (1 + s * s3);
+        two << -s * (2 + c * c3), c * (1 - s * s3), c * (1 - s * s3), s * c * c3;
+        const auto modes = field.at(1.0 / (2 * std::numbers::pi), t);
+        EXPECT_LT((modes[0].stress - one).norm(), 1e-12);
+        EXPECT_LT((modes[1].stress - two).norm(), 1e-12);
+    }
+    EXPECT_LT((field.release() - Mat2::Identity() / 50e6).norm(), 1e-13 / 50e6);
+}
+
+TEST(UnitNearTipField, ReleasesTheWorkOfClosingTheCrack) {
+    // Irwin 1957: G is half the mean of the stress ahead on what the faces open by behind, over a short advance d:
+    // with s(r) = s(1) r^-1/2 and u(r) = u(1) r^1/2 the mean over d of s(r) u(d - r) is pi / 2 s(1) u(1).
+    for (const Eigen::Matrix3d& compliance : compliances()) {
+        const NearTipField field(compliance);
+        const auto ahead = field.at(1.0, 0.0), upper = field.at(1.0, std::numbers::pi), lower = field.at(1.0, -std::numbers::pi);
+        Mat2 H;
+        for (int i = 0; i < 2; ++i) {
+            for (int j = 0; j < 2; ++j) {
+                // u = r^1/2 u(1) and du / dx = -u(1) / 2 on the faces.
+                const Vec2 opening = -2.0 * (upper[j].gradient.col(0) - lower[j].gradient.col(0));
+                H(i, j) = 0.5 * 0.5 * std::numbers::pi * ahead[i].stress.col(1).dot(opening);
+            }
+        }
+        EXPECT_LT((0.5 * (H + H.transpose()) - field.release()).norm(), 1e-12 * H.norm());
     }
 }
 
@@ -60,13 +113,17 @@ TEST(UnitHoopStress, TurnsAsErdoganAndSihSay) {
     for (const double K_II : {0.01, 0.3, 2.0, -1.0}) {
         // The shear stress vanishes there and the hoop stress is a maximum: seen in the near-tip field itself.
         const double angle = hoop_stress_angle(1.0, K_II);
-        const NearTipField field(1.0, K_II, 1.0, 0.3);
+        const NearTipField field(compliances()[0]);
+        const auto stress = [&](double t) {
+            const auto modes = field.at(1.0, t);
+            return Mat2(modes[0].stress + K_II * modes[1].stress);
+        };
         const auto hoop = [&](double t) {
             const Vec2 across(-std::sin(t), std::cos(t));
-            return across.dot(field.at(1.0, t).stress * across);
+            return across.dot(stress(t) * across);
         };
         const Vec2 across(-std::sin(angle), std::cos(angle)), out(std::cos(angle), std::sin(angle));
-        EXPECT_NEAR(across.dot(field.at(1.0, angle).stress * out), 0.0, 1e-12);
+        EXPECT_NEAR(across.dot(stress(angle) * out), 0.0, 1e-12);
         for (const double other : {-1.0, -0.1, 0.1, 1.0}) EXPECT_GT(hoop(angle), hoop(angle + other));
     }
 }

@@ -1,0 +1,111 @@
+#include "datasets/limits.hpp"
+#include "datasets/scene_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace crampfit {
+namespace {
+
+bool has_axial_constants(const OrthotropicElasticity& wood) { return wood.E_L > 0; }
+
+OrthotropicElasticity read_orthotropic(const Entry& entry, PlaneCondition plane) {
+    const auto modulus = [&](const char* key) { return entry.at(key).number(limits::youngs_modulus); };
+    const auto ratio = [&](const char* key) { return entry.at(key).number(limits::orthotropic_poisson_ratio); };
+    OrthotropicElasticity wood;
+    wood.E_R = modulus("E_R");
+    wood.E_T = modulus("E_T");
+    wood.G_RT = modulus("G_RT");
+    wood.nu_RT = ratio("nu_RT");
+    if (plane == PlaneCondition::strain || entry.has("E_L") || entry.has("nu_LR") || entry.has("nu_LT")) {
+        wood.E_L = modulus("E_L");
+        wood.nu_LR = ratio("nu_LR");
+        wood.nu_LT = ratio("nu_LT");
+    }
+    return wood;
+}
+
+}  // namespace
+
+std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood) {
+    const auto too_large = [](const char* key, double ratio, const char* moduli, double modulus, double other) -> std::optional<BrokenRule> {
+        const double most = std::sqrt(modulus / other);
+        if (std::abs(ratio) < most) {
+            return std::nullopt;
+        }
+        return BrokenRule{key, fmt::format("{} must lie between -{:.4g} and {:.4g}, the root of {}, or the wood could be strained without work",
+                                           key, most, most, moduli)};
+    };
+    if (const auto broken = too_large("nu_RT", wood.nu_RT, "E_R / E_T", wood.E_R, wood.E_T)) {
+        return broken;
+    }
+    if (!has_axial_constants(wood)) {
+        return std::nullopt;
+    }
+    if (const auto broken = too_large("nu_LR", wood.nu_LR, "E_L / E_R", wood.E_L, wood.E_R)) {
+        return broken;
+    }
+    if (const auto broken = too_large("nu_LT", wood.nu_LT, "E_L / E_T", wood.E_L, wood.E_T)) {
+        return broken;
+    }
+    const double rest = 1 - wood.nu_RT * wood.nu_RT * wood.E_T / wood.E_R - wood.nu_LR * wood.nu_LR * wood.E_R / wood.E_L -
+                        wood.nu_LT * wood.nu_LT * wood.E_T / wood.E_L - 2 * wood.nu_RT * wood.nu_LR * wood.nu_LT * wood.E_T / wood.E_L;
+    if (rest > 0) {
+        return std::nullopt;
+    }
+    return BrokenRule{"nu_RT", fmt::format("nu_RT, nu_LR and nu_LT are too large together: 1 - nu_RT^2 E_T/E_R - nu_LR^2 E_R/E_L - "
+                                           "nu_LT^2 E_T/E_L - 2 nu_RT nu_LR nu_LT E_T/E_L must be greater than 0 and is {:.4g}",
+                                           rest)};
+}
+
+std::map<std::string, SceneNumber> elastic_numbers(const Material& material) {
+    if (!material.orthotropic) {
+        return {{"E", {&material.youngs_modulus, limits::youngs_modulus}}, {"nu", {&material.poisson_ratio, limits::poisson_ratio}}};
+    }
+    const OrthotropicElasticity& wood = *material.orthotropic;
+    std::map<std::string, SceneNumber> numbers{{"E_R", {&wood.E_R, limits::youngs_modulus}},
+                                               {"E_T", {&wood.E_T, limits::youngs_modulus}},
+                                               {"G_RT", {&wood.G_RT, limits::youngs_modulus}},
+                                               {"nu_RT", {&wood.nu_RT, limits::orthotropic_poisson_ratio}}};
+    if (has_axial_constants(wood)) {
+        numbers.insert({{"E_L", {&wood.E_L, limits::youngs_modulus}},
+                        {"nu_LR", {&wood.nu_LR, limits::orthotropic_poisson_ratio}},
+                        {"nu_LT", {&wood.nu_LT, limits::orthotropic_poisson_ratio}}});
+    }
+    return numbers;
+}
+
+std::map<std::string, Material> read_materials(const Entry& materials, PlaneCondition plane) {
+    enum class Kind { isotropic, orthotropic, viscoelastic, plastic };
+    std::map<std::string, Material> result;
+    for (const auto& [name, entry] : materials.members()) {
+        const auto kind = entry.find("kind");
+        const Kind choice = kind ? kind->choice<Kind>({{"isotropic", Kind::isotropic},
+                                                       {"orthotropic", Kind::orthotropic},
+                                                       {"viscoelastic", Kind::viscoelastic},
+                                                       {"plastic", Kind::plastic}})
+                                 : Kind::isotropic;
+        if (choice == Kind::viscoelastic || choice == Kind::plastic) {
+            kind->fail(fmt::format("a material of kind \"{}\" is not supported yet", kind->text()));
+        }
+        Material material;
+        if (choice == Kind::orthotropic) {
+            entry.only({"kind", "E_R", "E_T", "G_RT", "nu_RT", "E_L", "nu_LR", "nu_LT", "density", "toughness"});
+            material.orthotropic = read_orthotropic(entry, plane);
+            if (const auto broken = broken_rule(*material.orthotropic)) {
+                entry.at(broken->key).fail(broken->rule);
+            }
+        } else {
+            entry.only({"kind", "E", "nu", "density", "toughness"});
+            material.youngs_modulus = entry.at("E").number(limits::youngs_modulus);
+            material.poisson_ratio = entry.at("nu").number(limits::poisson_ratio);
+        }
+        material.density = entry.at("density").number(limits::density);
+        material.toughness = entry.at("toughness").number(limits::toughness);
+        result[name] = material;
+    }
+    return result;
+}
+
+}  // namespace crampfit
