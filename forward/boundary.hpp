@@ -29,8 +29,9 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// A new field is held as the one that it comes from.
-    void adopt(const std::vector<CrackFields::NewField>& fields);
+    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a crack
+    /// that runs alongside the edge does not, and moves freely.
+    void hold_further_fields(const CrackFields& cracks);
 
     Vec2 velocity_of(int driver) const;                // while it moves [m/s]
     double travel_time(int driver) const;              // it stops then [s]; infinite: never
@@ -42,6 +43,7 @@ class Boundary {
   private:
     void hold_nodes(const CrackFields& cracks);
     void place_tractions();
+    bool lies_at(const Edge& edge, int field, int node) const;
 
     const Scene& scene_;
     const Discretisation& body_;

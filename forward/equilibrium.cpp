@@ -74,7 +74,7 @@ void Equilibrium::renumber() {
 std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, const Vec2& to) {
     const auto fields = cracks_.grow(crack, at_end, to);
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
-    boundary_.adopt(fields);
+    boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
     renumber();
     return fields;

@@ -182,6 +182,7 @@ bool Quasistatic::solve_from(double potential, double power, double time) {
     const double rounding = 1e-6 * std::abs(potential);
     if (time == from) return change <= rounding;
     const double added = 0.5 * (power + equilibrium_.power()) * (time - from);
+    if (power == 0.0) return change <= (1.0 + most_disagreement) * added + rounding;  // what comes to touch on the way adds less
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
