@@ -50,7 +50,7 @@ struct Quasistatic::Coarse {
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials)
     : Quasistatic(scene, plan, materials, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, *this);
-    if (!(plan.linear ? know_linear(0) : rests() && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+    if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader)
@@ -132,16 +132,6 @@ LoadState Quasistatic::nothing(double time) const {
 void Quasistatic::keep(std::size_t number, int time, LoadState state) {
     if (coarse_) extrapolate(state, coarse_->walk.places_[number].station.states.at(time));
     places_[number].station.states[time] = std::move(state);
-}
-
-// Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
-bool Quasistatic::rests() {
-    if (coarse_ && !coarse_->walk.rests()) return false;
-    if (!equilibrium_.boundary().tractions.empty()) return know(0, 0);
-    const std::size_t fields = equilibrium_.displacements().size();
-    places_[0].known[0] = {0, std::vector<Vec2>(fields, Vec2::Zero()), 0.0, 0.0};
-    keep(0, 0, nothing(0.0));
-    return true;
 }
 
 // In a linear scene no load and full load say all; the state half way is between them.
@@ -230,6 +220,12 @@ bool Quasistatic::know(std::size_t number, int time) {
     Place& place = places_[number];
     if (place.station.states.count(time)) return true;
     if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
+    if (time == 0 && equilibrium_.boundary().tractions.empty()) {
+        // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
+        place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
+        keep(number, 0, nothing(0.0));
+        return true;
+    }
     if (solve_for(place, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
         keep(number, time, load_state());

@@ -70,7 +70,6 @@ class Quasistatic {
     void find_route(std::size_t number);
     Vec2 next_tip(const Place& last, const TipLoad& load) const;
     bool know(std::size_t number, int time);
-    bool rests();
     bool know_linear(std::size_t number);
     bool solve_for(Place& place, int time);
     bool solve_from(double potential, double power, double time);
