@@ -12,8 +12,9 @@ namespace crampfit {
 
 namespace {
 
-// A pair of fields appears as soon as the tip has gone this part of a cell; its tie is then that much stiffer than the wood.
-constexpr double least_freed = 1e-3;
+// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with less,
+// it would spoil the condition of the stiffness; with more, the energy would go in steps.
+constexpr double least_freed = 0.02;
 
 // Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
 constexpr double face_stiffness_factor = 100.0;
@@ -179,6 +180,13 @@ bool Equilibrium::factor_tangent(bool geometric) {
             for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
             add_tangent(fields, sum);
         }
+    }
+    for (const InternalForce::Alone& alone : internal_force_.alone()) {
+        const auto& sign = InternalForce::crosswise_sign;
+        Eigen::Matrix<double, 8, 8> tangent;
+        for (int a = 0; a < 4; ++a)
+            for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
+        add_tangent(points.node[alone.point], tangent);
     }
     for (const FieldPair& pair : cracks_.pairs)
         if (mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0) add_pair(pair, pair_stiffness(pair));
