@@ -113,11 +113,33 @@ void Boundary::hold_nodes(const CrackFields& cracks) {
             throw InputError(scene_.file.string(), "bodies." + grip.name, "bonded",
                              "the body holds no node of the grid: it must overlap the specimen by a cell or so");
     }
-    // A crack that starts on a held edge has fields there already.
+    hold_further_fields(cracks);
+}
+
+// Whether some point of a field has its domain at the edge.
+bool Boundary::lies_at(const Edge& edge, int field, int node) const {
+    bool found = false;
+    body_.for_cells_near(body_.layout.node_position(node), 0.5 * body_.layout.cell.minCoeff(), [&](int c) {
+        for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p) {
+            const auto& fields = body_.points.node[p];
+            if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
+            const Box domain = body_.domain(p);
+            found |= on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high);
+        }
+    });
+    return found;
+}
+
+void Boundary::hold_further_fields(const CrackFields& cracks) {
+    const int nodes = body_.layout.nodes();
+    held.erase(std::remove_if(held.begin(), held.end(), [&](const Held& h) { return h.field >= nodes; }), held.end());
     const std::size_t on_nodes = held.size();
-    for (int f = layout.nodes(); f < cracks.fields(); ++f)
-        for (std::size_t i = 0; i < on_nodes; ++i)
-            if (held[i].field == cracks.node_of_field[f]) held.push_back({f, held[i].axis, held[i].driver});
+    for (int f = nodes; f < cracks.fields(); ++f)
+        for (std::size_t i = 0; i < on_nodes; ++i) {
+            const Held node = held[i];
+            if (node.field != cracks.node_of_field[f]) continue;
+            if (node.driver >= edges_ || lies_at(scene_.edges[node.driver], f, node.field)) held.push_back({f, node.axis, node.driver});
+        }
 }
 
 void Boundary::place_tractions() {
@@ -135,14 +157,6 @@ void Boundary::place_tractions() {
     }
 }
 
-void Boundary::adopt(const std::vector<CrackFields::NewField>& fields) {
-    for (const auto& [added, from] : fields) {
-        const std::size_t count = held.size();
-        for (std::size_t i = 0; i < count; ++i)
-            if (held[i].field == from) held.push_back({added, held[i].axis, held[i].driver});
-    }
-}
-
 double Boundary::travel_time(int driver) const {
     const auto& until = driver < edges_ ? scene_.edges[driver].until : scene_.bodies[driver - edges_].until;
     return until.value_or(std::numeric_limits<double>::infinity());
@@ -155,6 +169,18 @@ Vec2 Boundary::velocity_of(int driver) const {
 }
 
 Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
+
+std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std::size_t fields) const {
+    if (driver >= edges_ || !scene_.edges[driver].traction) return {};
+    std::vector<Vec2> load(fields, Vec2::Zero());
+    double length = 0.0;
+    for (const Traction& t : tractions)
+        if (t.driver == driver) length += t.facet.length;
+    for (const Traction& t : tractions)
+        for (int k = 0; k < 4 && t.driver == driver; ++k)
+            load[body_.points.node[t.facet.point][k]] += t.facet.length / length * t.facet.weight[k] * direction;
+    return load;
+}
 
 Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacement) const {
     if (driver >= edges_ || !scene_.edges[driver].traction) return travel(driver, time);

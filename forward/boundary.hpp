@@ -29,8 +29,9 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// A new field is held as the one that it comes from.
-    void adopt(const std::vector<CrackFields::NewField>& fields);
+    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a crack
+    /// that runs alongside the edge does not, and moves freely.
+    void hold_further_fields(const CrackFields& cracks);
 
     Vec2 velocity_of(int driver) const;                // while it moves [m/s]
     double travel_time(int driver) const;              // it stops then [s]; infinite: never
@@ -39,9 +40,14 @@ class Boundary {
     /// How far a driver has gone, prescribed or, under traction, on average over its facets [m].
     Vec2 moved(int driver, double time, const std::vector<Vec2>& displacement) const;
 
+    /// The forces on fields whose work is how far a driver under traction moves along a direction; empty where its motion is
+    /// prescribed.
+    std::vector<Vec2> load_to_move(int driver, const Vec2& direction, std::size_t fields) const;
+
   private:
     void hold_nodes(const CrackFields& cracks);
     void place_tractions();
+    bool lies_at(const Edge& edge, int field, int node) const;
 
     const Scene& scene_;
     const Discretisation& body_;

@@ -41,6 +41,12 @@ double length_inside(const std::vector<Vec2>& points, const Box& box) {
 
 } // namespace
 
+double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along) {
+    const LocalWood wood = materials.average(centre, half);
+    if (!materials.orthotropic() || wood.filled == 0.0) return wood.plane_modulus();
+    return 1.0 / near_tip_field(wood.elasticity.stiffness(), along).release()(0, 0);
+}
+
 Vec2 CrackLine::behind(bool at_end, double distance) const {
     const int n = static_cast<int>(points.size());
     for (int k = 0; k + 1 < n; ++k) {
@@ -191,15 +197,11 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         // The wood that counts is where the tip is, on the way, when it frees the pair.
         const bool at_end = (x - lines[k].end.position).squaredNorm() <= (x - lines[k].start.position).squaredNorm();
         const Vec2 on_the_way = x + tip_lag * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
-        const LocalWood wood = materials_->average(on_the_way, 0.5 * body_->layout.cell);
-        // What counts in orthotropic wood is how it opens: G = K_I^2 / E'.
-        const double plane_modulus =
-            materials_->orthotropic() && wood.filled > 0.0
-                ? 1.0 / near_tip_field(wood.elasticity.stiffness(), lines[k].tip(at_end).direction).release()(0, 0)
-                : wood.plane_modulus();
+        const Vec2 along = lines[k].tip(at_end).direction;
+        const double plane_modulus = opening_modulus(*materials_, on_the_way, 0.5 * body_->layout.cell, along);
         const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
         pairs.push_back({own_is_left ? own : other, own_is_left ? other : own, node, k,
-                         left_of(lines[k].direction_near(true, x)), plane_modulus, 0.0});
+                         left_of(lines[k].direction_near(true, x)), on_the_way, along, plane_modulus, 0.0});
     }
 }
 

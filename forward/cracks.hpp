@@ -38,9 +38,14 @@ struct FieldPair {
     int node;         // where they are
     int crack;
     Vec2 normal;      // unit, from right to left
-    double plane_modulus;  // E' of the wood where the tip frees it [Pa]
+    Vec2 freed_at;         // where the tip is when it frees the pair
+    Vec2 along;            // unit, the way that it goes
+    double plane_modulus;  // E' of the wood there [Pa]
     double tie;       // stiffness that still holds the pair together [N/m]; 0 once the crack has cut the node's whole support
 };
+
+/// E' of the wood of a small area as a crack that runs along a direction sees it, G = K_I^2 / E' [Pa].
+double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along);
 
 /// Which velocity field of a node a point belongs to (CRAMP; Nairn 2003): points that a crack separates from a node move with
 /// another field of that node. Fields are numbered: the nodes first, then further fields as cracks call for them.

@@ -20,12 +20,14 @@ struct TipLoad {
     double toughness = 0;     // of the wood at the tip [J/m^2]
 };
 
-/// Radii of the virtual extension, in cells. It shrinks where other wood is near, so that little hangs on the gradient term.
+/// Radii of the virtual extension, in cells. It shrinks where other wood is near, so that little hangs on the gradient term,
+/// and keeps off other cracks.
 struct EnergyReleaseOptions {
     double inner = 2.0;        // the part that moves rigidly with the tip
     double outer = 4.5;        // beyond it nothing moves
     double least_inner = 1.0;        // holds the tied pair at the tip
-    double least_outer = 3.0;
+    double least_outer = 3.0;        // in other wood
+    double least_outer_at_cracks = 2.0;
     bool rotates = false;
 };
 

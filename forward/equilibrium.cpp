@@ -11,8 +11,9 @@ namespace crampfit {
 
 namespace {
 
-// A pair of fields appears as soon as the tip has gone this part of a cell; its tie is then that much stiffer than the wood.
-constexpr double least_freed = 1e-3;
+// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with less,
+// it would spoil the condition of the stiffness; with more, the energy would go in steps.
+constexpr double least_freed = 0.02;
 
 // Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
 constexpr double face_stiffness_factor = 100.0;
@@ -77,7 +78,7 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     const Box changed = cracks_.window(cracks_.lines[crack].tip(at_end).position, to);
     const auto fields = cracks_.grow(crack, at_end, to);
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
-    boundary_.adopt(fields);
+    boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
     renumber();
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
@@ -124,27 +125,15 @@ void Equilibrium::find_forces() {
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
 
-// Of points or a facet of a cell. What prescribed components still have to go loads the others.
+// What prescribed components still have to go loads the others.
 GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
     GridFactor::Element made{{}, stiffness};
-    for (int a = 0; a < 8; ++a) made.equation[a] = equation_[2 * fields[a / 2] + a % 2];
+    for (int a = 0; a < 8; ++a) made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
     for (int b = 0; b < 8; ++b) {
-        const double step = prescribed_step_[2 * fields[b / 2] + b % 2];
+        const double step = fields[b / 2] < 0 ? 0.0 : prescribed_step_[2 * fields[b / 2] + b % 2];
         if (made.equation[b] >= 0 || step == 0.0) continue;
         for (int a = 0; a < 8; ++a)
             if (made.equation[a] >= 0) step_load_[made.equation[a]] -= stiffness(a, b) * step;
-    }
-    return made;
-}
-
-GridFactor::Element Equilibrium::element(const FieldPair& pair, const Mat2& stiffness) const {
-    GridFactor::Element made;
-    made.equation.fill(-1);
-    made.stiffness.setZero();
-    made.stiffness.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
-    for (int axis = 0; axis < 2; ++axis) {
-        made.equation[axis] = equation_[2 * pair.left + axis];
-        made.equation[2 + axis] = equation_[2 * pair.right + axis];
     }
     return made;
 }
@@ -186,14 +175,27 @@ void Equilibrium::add_pairs() {
         const int cell = layout.cell_index(i, j);
         const Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
         if (std::exchange(pair_stiffness_[k], stiffness) != stiffness) factor_.mark(cell);
-        if (!stiffness.isZero(0.0)) extra_.emplace(cell, element(pair, stiffness));
+        if (stiffness.isZero(0.0)) continue;
+        Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
+        both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
+        extra_.emplace(cell, element({pair.left, pair.right, -1, -1}, both));
+    }
+}
+
+void Equilibrium::add_lone_points() {
+    for (const InternalForce::Alone& alone : internal_force_.alone()) {
+        const auto& sign = InternalForce::crosswise_sign;
+        Eigen::Matrix<double, 8, 8> tangent;
+        for (int a = 0; a < 4; ++a)
+            for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
+        extra_.emplace(body_.points.cell[alone.point], element(body_.points.node[alone.point], tangent));
     }
 }
 
 void Equilibrium::add_touches(bool geometric) {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const Vec2 gone = boundary_.travel(sliding_driver_[i], time_);
-        const Vec2 still_to_go = boundary_.travel(sliding_driver_[i], next_time_) - gone;
+        const Vec2& still_to_go = still_to_go_[sliding_driver_[i]];
         for (const SlidingBody::Touch& touch : sliding_[i].touches(gone, displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const std::array<int, 4>& fields = body_.points.node[facet.point];
@@ -219,6 +221,7 @@ bool Equilibrium::factor_tangent(bool geometric) {
     if (!plan_.linear) factor_.mark_all();
     step_load_.setZero(equations_);
     extra_.clear();
+    add_lone_points();
     add_pairs();
     add_touches(geometric);
     ++factorisations_;
@@ -243,6 +246,8 @@ void Equilibrium::prescribe(double time) {
     for (const Boundary::Held& held : boundary_.held)
         prescribed_step_[2 * held.field + held.axis] =
             boundary_.travel(held.driver, time)[held.axis] - displacement_[held.field][held.axis];
+    still_to_go_.resize(boundary_.drivers());
+    for (int d = 0; d < boundary_.drivers(); ++d) still_to_go_[d] = boundary_.travel(d, time) - boundary_.travel(d, time_);
     next_time_ = time;
     if (plan_.linear) move_prescribed();
 }
@@ -251,6 +256,7 @@ void Equilibrium::move_prescribed() {
     time_ = next_time_;
     for (std::size_t dof = 0; dof < equation_.size(); ++dof) displacement_[dof / 2][dof % 2] += prescribed_step_[dof];
     std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
+    std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
 }
 
 // Slope of the potential along a step of the equations' unknowns [J].
@@ -297,6 +303,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (renew && !factor_tangent(true) && !factor_tangent(false)) {
             if (time_ == time) return Outcome::mechanism;
             time_ = time;  // held by bodies that do not touch yet, perhaps: try with these where they are going
+            std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
             find_forces();
             if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         }

@@ -5,6 +5,7 @@
 #include "forward/energy_release.hpp"
 #include "forward/grid_factor.hpp"
 #include "forward/internal_force.hpp"
+#include "forward/material_slope.hpp"
 #include "forward/plan.hpp"
 
 #include <map>
@@ -43,6 +44,23 @@ class Equilibrium {
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
     int factorisations() const { return factorisations_; }
 
+    /// What moves while drivers do, the cracks standing, per time or per length that the drivers go.
+    struct Motion {
+        std::vector<Vec2> drivers;  // [drivers]
+        std::vector<Vec2> fields;   // [fields]
+    };
+
+    /// The motions that such motions of the drivers bring about from here on, by the tangent at this equilibrium. None where that is
+    /// not positive definite.
+    std::vector<Motion> motions(const std::vector<std::vector<Vec2>>& drivers);
+
+    /// The motion that this load on the points and facets would bring about [N].
+    Motion yield_to(const std::vector<Vec2>& load) const;
+
+    /// Derivatives by numbers of the materials at this equilibrium: row 0 that of the potential; row 1 + i that of its slope along motion
+    /// i, as it is found anew where the number is another.
+    Eigen::MatrixXd slopes(const std::vector<MaterialSlope>& numbers, const std::vector<Motion>& motions);
+
     /// Everything that growth and solution change, to come back to.
     struct Snapshot {
         CrackFields cracks;
@@ -60,10 +78,12 @@ class Equilibrium {
     void find_forces();
     bool factor_tangent(bool geometric);
     GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
-    GridFactor::Element element(const FieldPair& pair, const Mat2& stiffness) const;
     void add_points(int cell, bool geometric, std::vector<GridFactor::Element>& elements);
+    void add_lone_points();
     void add_pairs();
     void add_touches(bool geometric);
+    Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
+    Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
     double largest_residual() const;
@@ -95,6 +115,7 @@ class Equilibrium {
     double face_energy_ = 0;          // [J]
     double time_ = 0;                 // [s]
     double next_time_ = 0;            // that is being solved for [s]
+    std::vector<Vec2> still_to_go_;   // [drivers] until then [m]
 
     GridFactor factor_;
     std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points

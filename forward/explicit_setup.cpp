@@ -39,7 +39,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
         acceleration_.push_back(acceleration_[from]);
         force_.push_back(Vec2::Zero());
     }
-    boundary_.adopt(fields);
+    boundary_.hold_further_fields(cracks_);
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
 }

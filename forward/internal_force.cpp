@@ -12,6 +12,7 @@ void InternalForce::sort_cells() {
     const Points& points = body_.points;
     whole_cells_.clear();
     loose_points_.clear();
+    alone_.clear();
     for (int c = 0; c < body_.layout.cells(); ++c) {
         const int first = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
@@ -19,8 +20,28 @@ void InternalForce::sort_cells() {
         if (body_.cell_is_full(c) && std::all_of(points.node.begin() + first, points.node.begin() + last, same))
             whole_cells_.push_back(c);
         else
-            for (int p = first; p < last; ++p) loose_points_.push_back(p);
+            for (int p = first; p < last; ++p) {
+                loose_points_.push_back(p);
+                if (std::count(points.node.begin() + first, points.node.begin() + last, points.node[p]) == 1)
+                    alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
+            }
     }
+}
+
+double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
+    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y C_ss)
+    // q_y^2], shear coupling aside.
+    const Points& points = body_.points;
+    const Vec2 moment = body_.layout.point_size().cwiseAbs2() / 12.0;
+    const double both = moment.y() * stiffness(0, 0) + moment.x() * stiffness(1, 1) + moment.sum() * stiffness(2, 2);
+    const double area = body_.layout.cell.prod();
+    return 0.5 * points.volume[point] * both / (area * area);
+}
+
+Vec2 InternalForce::crosswise(int point, const std::vector<Vec2>& displacement) const {
+    Vec2 sum = Vec2::Zero();
+    for (int k = 0; k < 4; ++k) sum += crosswise_sign[k] * displacement[body_.points.node[point][k]];
+    return sum;
 }
 
 template <int PointsPerCell, bool Rotates>
@@ -110,6 +131,10 @@ void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>
         for (int k = 0; k < 4; ++k)
             force[points.node[p][k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
     }
+    for (const Alone& a : alone_) {
+        const Vec2 pull = a.stiffness * crosswise(a.point, displacement);
+        for (int k = 0; k < 4; ++k) force[points.node[a.point][k]] -= crosswise_sign[k] * pull;
+    }
 }
 
 double InternalForce::energy(const std::vector<Vec2>& displacement) const {
@@ -118,6 +143,7 @@ double InternalForce::energy(const std::vector<Vec2>& displacement) const {
     for (const int p : loose_points_)
         sum += points.volume[p] *
                elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_).energy;
+    for (const Alone& a : alone_) sum += 0.5 * a.stiffness * crosswise(a.point, displacement).squaredNorm();
     return sum;
 }
 

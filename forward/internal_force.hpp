@@ -2,6 +2,7 @@
 
 #include "forward/discretisation.hpp"
 
+#include <array>
 #include <vector>
 
 namespace crampfit {
@@ -9,14 +10,31 @@ namespace crampfit {
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
 /// displacements. Cells that hold all their points on four common fields are taken a cell at a time, side by side; the others,
 /// next to a crack or a cutout, point by point.
+///
+/// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
+/// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient
+/// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
+/// u_2 + u_3|^2. A straight line among displacements does not feel it.
 class InternalForce {
   public:
+    static constexpr std::array<double, 4> crosswise_sign{1.0, -1.0, -1.0, 1.0};  // of a cell's nodes
+
     InternalForce(const Discretisation& body, bool rotates);
 
     /// Call after points changed their fields.
     void sort_cells();
 
     void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+
+    struct Alone {
+        int point;
+        double stiffness;  // k, the mean of both directions, so that it does not feel rotation [N/m]
+    };
+    const std::vector<Alone>& alone() const { return alone_; }
+
+    /// k of a point with this stiffness [N/m].
+    double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
+    Vec2 crosswise(int point, const std::vector<Vec2>& displacement) const;  // u_0 - u_1 - u_2 + u_3 [m]
 
     /// Strain energy of all points [J].
     double energy(const std::vector<Vec2>& displacement) const;
@@ -29,6 +47,7 @@ class InternalForce {
 
     const Discretisation& body_;
     bool rotates_;
+    std::vector<Alone> alone_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
 };

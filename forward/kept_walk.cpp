@@ -1,23 +1,30 @@
 #include "forward/kept_walk.hpp"
 
+#include "datasets/io.hpp"
 #include "forward/trace.hpp"
 
 #include <chrono>
 
 namespace crampfit {
 
-KeptWalk::KeptWalk(const Scene& scene)
-    : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))) {
+KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers)
+    : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers) {
     int tips = 0;
     for (const Crack& crack : scene_.cracks) tips += crack.grows == Growth::both ? 2 : crack.grows != Growth::none;
     reusable_ = plan_.quasistatic && tips <= 1;
+    has_slopes_ = reusable_;
+    for (const Crack& crack : scene_.cracks) has_slopes_ = has_slopes_ && (crack.grows == Growth::none || crack.advance > 0.0);
+    if (!has_slopes_) numbers_.clear();
 }
 
 Record KeptWalk::run(const Scene& scene, const SimulateOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
-    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_);
+    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, numbers_);
     const int known = walk_->equilibria();
+    std::vector<double> by;
+    for (const std::string& key : numbers_) by.push_back(get_number(scene, key) - get_number(scene_, key));
+    walk_->shift(by);
     Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) {
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
     });

@@ -9,22 +9,32 @@ namespace crampfit {
 
 /// A scene at equilibrium, kept for runs with other toughnesses: these share the way of the crack and all equilibria along it, and
 /// take milliseconds where a first run takes seconds. The crack's path is the one that the first toughness gave.
+///
+/// Runs with other moduli nearby share them too, to first order: every equilibrium moves by its derivative. Two such runs to
+/// either side give the derivative of all that a record holds, on the path as it is.
 class KeptWalk {
   public:
-    /// Throws InputError as `simulate` does.
-    explicit KeptWalk(const Scene& scene);
+    /// `numbers`: keys of numbers of the materials, other than toughness, by which derivatives are wanted. Throws InputError as
+    /// `simulate` does.
+    explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {});
+
+    /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had.
+    bool has_slopes() const { return has_slopes_; }
 
     /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
     bool reusable() const { return reusable_; }
 
-    /// Runs `scene`, which differs from the first one by toughness alone; no frames. One run at a time: others wait.
+    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. One run at a
+    /// time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options);
 
   private:
     Scene scene_;
     MaterialMap materials_;
     Plan plan_;
+    std::vector<std::string> numbers_;
     bool reusable_ = false;
+    bool has_slopes_ = false;
     std::mutex mutex_;
     std::unique_ptr<Quasistatic> walk_;
 };

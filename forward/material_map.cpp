@@ -166,12 +166,12 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     const int samples = std::clamp(fit, 2, 16);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
-    std::vector<double> modulus(static_cast<std::size_t>(samples) * samples, 0.0);
+    std::vector<double> latewood(static_cast<std::size_t>(samples) * samples, 0.0);  // layers lie as it does, whatever the moduli
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
             const Vec2 place((2.0 * i + 1.0) / samples - 1.0, (2.0 * j + 1.0) / samples - 1.0);
             const LocalWood here = at(centre + place.cwiseProduct(half));
-            modulus[static_cast<std::size_t>(j) * samples + i] = here.plane_modulus();
+            latewood[static_cast<std::size_t>(j) * samples + i] = here.latewood;
             sum.elasticity.coefficients += here.elasticity.coefficients;
             if (orthotropic_) elasticities.push_back(here.elasticity);
             sum.density += here.density;
@@ -185,7 +185,7 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     const double share = 1.0 / sum.filled;  // means over what is there; the void only thins the point
     sum.elasticity.coefficients *= share;
     if (orthotropic_) average_elasticity(elasticities, samples, sum.elasticity);
-    else sum.elasticity.normal = steepest(modulus, samples);
+    else sum.elasticity.normal = steepest(latewood, samples);
     sum.density *= share;
     sum.toughness *= share;
     sum.poisson_ratios *= share;

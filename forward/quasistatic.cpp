@@ -43,19 +43,21 @@ struct Quasistatic::Coarse {
     MaterialMap materials;
     Quasistatic walk;
 
-    Coarse(const Scene& fine, const Plan& plan, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, &leader) {}
+    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, const Quasistatic& leader)
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, &leader) {}
 };
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials)
-    : Quasistatic(scene, plan, materials, nullptr) {
-    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, *this);
-    if (!(plan.linear ? know_linear(0) : rests() && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers)
+    : Quasistatic(scene, plan, materials, numbers, nullptr) {
+    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, *this);
+    if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader)
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+                         const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
       equilibrium_(scene, plan, materials, body_) {
+    for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
@@ -130,18 +132,65 @@ LoadState Quasistatic::nothing(double time) const {
 
 // Keeps a state of a place, made better by the second grid's.
 void Quasistatic::keep(std::size_t number, int time, LoadState state) {
-    if (coarse_) extrapolate(state, coarse_->walk.places_[number].station.states.at(time));
-    places_[number].station.states[time] = std::move(state);
+    if (coarse_) extrapolate(state, coarse_->walk.places_[number].states.at(time));
+    places_[number].states[time] = places_[number].station.states[time] = std::move(state);
 }
 
-// Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
-bool Quasistatic::rests() {
-    if (coarse_ && !coarse_->walk.rests()) return false;
-    if (!equilibrium_.boundary().tractions.empty()) return know(0, 0);
-    const std::size_t fields = equilibrium_.displacements().size();
-    places_[0].known[0] = {0, std::vector<Vec2>(fields, Vec2::Zero()), 0.0, 0.0};
-    keep(0, 0, nothing(0.0));
-    return true;
+void Quasistatic::keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes) {
+    for (std::size_t n = 0; coarse_ && n < slopes.size(); ++n)
+        extrapolate(slopes[n], coarse_->walk.places_[number].slopes.at(time)[n]);
+    places_[number].slopes[time] = std::move(slopes);
+    if (!shift_.empty()) show_shifted(number, time);
+}
+
+// Derivatives of the state where the equilibrium stands. What is prescribed has none.
+std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
+    const Boundary& boundary = equilibrium_.boundary();
+    const Gauges gauges(scene_);
+    std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
+    for (int d = 0; d < boundary.drivers(); ++d)
+        if (equilibrium_.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
+    drives[1][gauges.force] = gauges.force_direction;
+    std::vector<Equilibrium::Motion> motions = equilibrium_.motions(drives);
+    if (motions.empty()) return std::nullopt;
+    const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
+    if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
+    const Eigen::MatrixXd slope = equilibrium_.slopes(numbers_, motions);
+    std::vector<LoadState> found(numbers_.size());
+    for (std::size_t n = 0; n < numbers_.size(); ++n) {
+        found[n].potential = slope(0, n);
+        found[n].power = slope(1, n);
+        found[n].reactions.assign(boundary.drivers(), Vec2::Zero());
+        found[n].reactions[gauges.force] = slope(2, n) * gauges.force_direction;
+        if (!pulled.empty()) found[n].displacement = -slope(3, n);
+        found[n].tips.resize(2 * scene_.cracks.size());
+    }
+    return found;
+}
+
+// Puts what the shift makes of a state in its place.
+void Quasistatic::show_shifted(std::size_t number, int time) {
+    Place& place = places_[number];
+    LoadState state = place.states.at(time);
+    for (std::size_t n = 0; n < shift_.size(); ++n) {
+        const LoadState& slope = place.slopes.at(time)[n];
+        state.potential += shift_[n] * slope.potential;
+        state.power += shift_[n] * slope.power;
+        state.displacement += shift_[n] * slope.displacement;
+        for (std::size_t d = 0; d < state.reactions.size(); ++d) state.reactions[d] += shift_[n] * slope.reactions[d];
+    }
+    place.station.states[time] = std::move(state);
+}
+
+void Quasistatic::shift(const std::vector<double>& by) {
+    shift_ = std::any_of(by.begin(), by.end(), [](double d) { return d != 0.0; }) ? by : std::vector<double>{};
+    for (Place& place : places_) {
+        place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
+        place.station.ahead.clear();
+    }
+    if (shift_.empty()) return;
+    for (std::size_t number = 0; number < places_.size(); ++number)
+        for (const auto& [time, slopes] : places_[number].slopes) show_shifted(number, time);
 }
 
 // In a linear scene no load and full load say all; the state half way is between them.
@@ -155,7 +204,18 @@ bool Quasistatic::know_linear(std::size_t number) {
         const bool good = solve(2);
         if (!good && !places_[number].station.left) return false;
         const LoadState full = good ? load_state() : nothing(time_of(2));
-        for (const int time : {0, 1, 2}) keep(number, time, scaled(full, 0.5 * time));
+        std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));
+        if (good && !numbers_.empty()) {
+            auto here = slopes_here();
+            if (!here) return false;
+            slopes = std::move(*here);
+        }
+        for (const int time : {0, 1, 2}) {
+            keep(number, time, scaled(full, 0.5 * time));
+            std::vector<LoadState> at_time;
+            for (const LoadState& slope : slopes) at_time.push_back(scaled(slope, 0.5 * time));
+            keep_slopes(number, time, std::move(at_time));
+        }
         return true;
     }
     if (!solve(0)) return false;
@@ -167,6 +227,10 @@ bool Quasistatic::know_linear(std::size_t number) {
         for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
         equilibrium_.set_displacements(u, time_of(time));
         keep(number, time, load_state());
+        if (numbers_.empty()) continue;
+        auto slopes = slopes_here();
+        if (!slopes) return false;
+        keep_slopes(number, time, std::move(*slopes));
     }
     return true;
 }
@@ -182,6 +246,7 @@ bool Quasistatic::solve_from(double potential, double power, double time) {
     const double rounding = 1e-6 * std::abs(potential);
     if (time == from) return change <= rounding;
     const double added = 0.5 * (power + equilibrium_.power()) * (time - from);
+    if (power == 0.0) return change <= (1.0 + most_disagreement) * added + rounding;  // what comes to touch on the way adds less
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
@@ -224,11 +289,40 @@ bool Quasistatic::solve_for(Place& place, int time) {
     return false;
 }
 
-// Finds the equilibrium of a place at a time, if it is not known.
+// Knows the state of a place at a time, as the shift has it.
 bool Quasistatic::know(std::size_t number, int time) {
+    if (places_[number].station.states.count(time)) return true;
+    if (!places_[number].states.count(time) && !find(number, time)) return false;
+    return shift_.empty() || know_slopes(number, time);
+}
+
+bool Quasistatic::know_slopes(std::size_t number, int time) {
     Place& place = places_[number];
-    if (place.station.states.count(time)) return true;
+    if (place.slopes.count(time)) return true;
+    if (coarse_ && !coarse_->walk.know_slopes(number, time)) return false;
+    std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));  // of what carries nothing
+    const auto known = place.known.find(time);
+    if (known != place.known.end() && (time > 0 || !equilibrium_.boundary().tractions.empty())) {
+        enter(place);
+        equilibrium_.set_displacements(known->second.displacement, time_of(time));
+        auto here = slopes_here();
+        if (!here) return false;
+        slopes = std::move(*here);
+    }
+    keep_slopes(number, time, std::move(slopes));
+    return true;
+}
+
+// Finds the equilibrium of a place at a time.
+bool Quasistatic::find(std::size_t number, int time) {
+    Place& place = places_[number];
     if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
+    if (time == 0 && equilibrium_.boundary().tractions.empty()) {
+        // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
+        place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
+        keep(number, 0, nothing(0.0));
+        return true;
+    }
     if (solve_for(place, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
         keep(number, time, load_state());

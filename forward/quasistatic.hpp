@@ -24,8 +24,12 @@ namespace crampfit {
 class Quasistatic {
   public:
     /// `scene`, `plan` and `materials` must outlive this.
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials);
+    /// `numbers`: keys of numbers of the materials by which derivatives are wanted.
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {});
     ~Quasistatic();
+
+    /// From now on all states are as they would be with the numbers shifted by so much, to first order; the crack's way stays.
+    void shift(const std::vector<double>& by);
 
     /// Follows the crack to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
     /// has reached a free surface, or there is no equilibrium. `now` is how far the load has come [s].
@@ -62,20 +66,27 @@ class Quasistatic {
         std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene
         std::map<int, Known> known;                     // by number of the time
         std::map<int, Known> guess;                     // the same of the place before, handed on
+        std::map<int, LoadState> states;                // as they were found, whatever the shift
+        std::map<int, std::vector<LoadState>> slopes;   // [numbers] their derivatives
     };
 
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Quasistatic* leader);
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+                const Quasistatic* leader);
     void add_place();
     bool extend(double now);
     void find_route(std::size_t number);
     Vec2 next_tip(const Place& last, const TipLoad& load) const;
     bool know(std::size_t number, int time);
-    bool rests();
+    bool find(std::size_t number, int time);
     bool know_linear(std::size_t number);
     bool solve_for(Place& place, int time);
     bool solve_from(double potential, double power, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);
+    void keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes);
+    bool know_slopes(std::size_t number, int time);
+    std::optional<std::vector<LoadState>> slopes_here();
+    void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     LoadState load_state() const;
     LoadState nothing(double time) const;
@@ -88,6 +99,8 @@ class Quasistatic {
     const Quasistatic* leader_;
     Discretisation body_;
     Equilibrium equilibrium_;
+    std::vector<MaterialSlope> numbers_;
+    std::vector<double> shift_;                   // [numbers]; empty: none
     std::deque<Place> places_;
     const Place* entered_ = nullptr;              // the one that the equilibrium stands at
     std::vector<std::pair<int, bool>> growing_;   // tips: crack, at its end

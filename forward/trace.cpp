@@ -105,8 +105,8 @@ class Tracer {
 
     void follow() {
         Moment here = moment_at_rest();
-        if (!know_station(0, 0.0)) return;
         add(here, false);
+        if (!know_station(0, 0.0)) return;
         double now = 0.0;
         std::size_t i = 0;
         while (true) {

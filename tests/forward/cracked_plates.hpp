@@ -72,6 +72,30 @@ inline Mat2 griffith_stress(const Mat2& remote, double a, const Vec2& x) {
     return stress;
 }
 
+/// Puts on all four sides of a square what the stress of a solution says, facet by facet, and holds the square so that what holds it
+/// feels nothing: the load is in balance.
+template <class Stress>
+void load_sides(Scene& scene, Stress stress) {
+    const double width = scene.specimen.size.x(), h = scene.model.cell;
+    const int facets = 2 * static_cast<int>(std::lround(width / h));  // points along a side
+    for (const Side side : {Side::top, Side::bottom, Side::left, Side::right}) {
+        for (int i = 0; i < facets; ++i) {
+            const double from = i * width / facets, to = (i + 1) * width / facets, middle = 0.5 * (from + to);
+            const bool level = side == Side::top || side == Side::bottom;
+            const double far = side == Side::top || side == Side::right ? 1.0 : -1.0;
+            const double fixed = far > 0 ? width : 0.0;
+            const Vec2 x = level ? Vec2(middle, fixed) : Vec2(fixed, middle);
+            const Vec2 normal = level ? Vec2(0.0, far) : Vec2(far, 0.0);
+            Edge edge = pulled("side", side, stress(x) * normal);
+            edge.range = {{from, to}};
+            scene.edges.push_back(edge);
+        }
+    }
+    scene.edges.push_back(held_at("hinge", Side::left, 0.5 * width, h, 0.0, 0.0));
+    scene.edges.push_back(held_at("slide", Side::right, 0.5 * width, h, std::nullopt, 0.0));
+    scene.measure = {"hinge", "hinge"};
+}
+
 struct SlantedCrack {
     double cells = 10.0;             // per half crack
     double angle = 0.0;              // of the crack against the grid [rad]
@@ -94,28 +118,12 @@ Scene slanted_crack(const SlantedCrack& c, const Exact& exact = griffith_stress)
     Mat2 axes;
     axes << along, left_of(along);
     const Mat2 remote = axes.transpose() * c.remote * axes;
-    const int facets = 2 * static_cast<int>(std::lround(width / h));  // points along a side
-    for (const Side side : {Side::top, Side::bottom, Side::left, Side::right}) {
-        for (int i = 0; i < facets; ++i) {
-            const double from = i * width / facets, to = (i + 1) * width / facets, middle = 0.5 * (from + to);
-            const bool level = side == Side::top || side == Side::bottom;
-            const double far = side == Side::top || side == Side::right ? 1.0 : -1.0;
-            const double fixed = far > 0 ? width : 0.0;
-            const Vec2 x = level ? Vec2(middle, fixed) : Vec2(fixed, middle);
-            const Vec2 normal = level ? Vec2(0.0, far) : Vec2(far, 0.0);
-            const Mat2 stress = axes * exact(remote, a, axes.transpose() * (x - centre)) * axes.transpose();
-            Edge edge = pulled("side", side, stress * normal);
-            edge.range = {{from, to}};
-            scene.edges.push_back(edge);
-        }
-    }
-    // The load is in balance: what holds the plate feels nothing.
-    scene.edges.push_back(held_at("hinge", Side::left, 0.5 * width, h, 0.0, 0.0));
-    scene.edges.push_back(held_at("slide", Side::right, 0.5 * width, h, std::nullopt, 0.0));
+    load_sides(scene, [&](const Vec2& x) -> Mat2 {
+        return axes * exact(remote, a, axes.transpose() * (x - centre)) * axes.transpose();
+    });
     Crack crack;
     crack.points = {centre - a * along, centre + a * along};
     scene.cracks = {crack};
-    scene.measure = {"hinge", "hinge"};
     return scene;
 }
 

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "forward/discretisation.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// How the wood of a discretisation changes with one number of the scene's materials ("materials.EW.E"), however it is mixed in a
+/// cell: by central differences of the map from the numbers to the wood, which is smooth and in closed form, with a step of
+/// 1e-5 of the number. Their error is of the order of 1e-10.
+class MaterialSlope {
+  public:
+    /// Throws InputError where the scene has no such number.
+    MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body);
+
+    /// Stiffness of a cell's points [Pa / the number's unit].
+    const Eigen::Matrix3d& stiffness(int cell) const { return stiffness_[cell]; }
+
+    /// Of `opening_modulus`.
+    double opening_modulus(const Vec2& centre, const Vec2& half, const Vec2& along) const;
+
+  private:
+    struct Shifted;
+    double step_;
+    std::shared_ptr<const Shifted> more_, less_;
+    std::vector<Eigen::Matrix3d> stiffness_;  // [cells]
+};
+
+} // namespace crampfit
