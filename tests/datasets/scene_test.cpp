@@ -432,7 +432,7 @@ TEST(UnitScene, OrthotropicWood) {
         {orthotropic_scene, "E_R = \"800 MPa\"", "E_R = \"0 MPa\"", "materials.EW.E_R", "greater than 0"},
         {orthotropic_scene, "G_RT = \"40 MPa\"\n", "", "materials.EW.G_RT", "missing key"},
         {orthotropic_scene, "E_L = \"11 GPa\"\n", "", "materials.EW.E_L", "missing key"},
-        {orthotropic_scene, "nu_RT", "nu_TR", "materials.EW.nu_TR", "did you mean \"nu_RT\"?"},
+        {orthotropic_scene, "nu_RT", "nu_TR", "materials.EW.nu_TR", "give nu_RT = nu_TR E_R / E_T instead"},
         {orthotropic_scene, "G_RT", "E", "materials.EW.E", "unknown key"},
         {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.4143", "materials.EW.nu_RT", "between -1.414 and 1.414, the root of E_R / E_T"},
         {orthotropic_scene, "nu_LR = 0.4", "nu_LR = -3.8", "materials.EW.nu_LR", "the root of E_L / E_R"},

@@ -4,6 +4,7 @@
 #include "forward/near_tip_field.hpp"
 #include "tests/forward/cracked_plates.hpp"
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <algorithm>
