@@ -10,6 +10,15 @@ namespace {
 
 bool has_axial_constants(const OrthotropicElasticity& wood) { return wood.E_L > 0; }
 
+/// The other way round a Poisson's ratio is a number of its own, easily taken for the one that is asked for.
+void refuse_converse_ratios(const Entry& entry) {
+    for (const char* key : {"nu_TR", "nu_RL", "nu_TL"}) {
+        if (const auto given = entry.find(key)) {
+            given->fail(fmt::format("give nu_{1}{0} = {2} E_{1} / E_{0} instead: strain along {0} under stress along {1}", key[3], key[4], key));
+        }
+    }
+}
+
 OrthotropicElasticity read_orthotropic(const Entry& entry, PlaneCondition plane) {
     const auto modulus = [&](const char* key) { return entry.at(key).number(limits::youngs_modulus); };
     const auto ratio = [&](const char* key) { return entry.at(key).number(limits::orthotropic_poisson_ratio); };
@@ -91,6 +100,7 @@ std::map<std::string, Material> read_materials(const Entry& materials, PlaneCond
         }
         Material material;
         if (choice == Kind::orthotropic) {
+            refuse_converse_ratios(entry);
             entry.only({"kind", "E_R", "E_T", "G_RT", "nu_RT", "E_L", "nu_LR", "nu_LT", "density", "toughness"});
             material.orthotropic = read_orthotropic(entry, plane);
             if (const auto broken = broken_rule(*material.orthotropic)) {

@@ -2,6 +2,8 @@
 
 #include "forward/near_tip_field.hpp"
 
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>

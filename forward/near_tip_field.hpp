@@ -2,9 +2,6 @@
 
 #include "forward/deformation.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include <complex>
 #include <numbers>
 
@@ -23,18 +20,7 @@ class NearTipField {
     using Complex = std::complex<double>;
 
     /// `compliance` in the axes of the crack, x ahead [1/Pa].
-    explicit NearTipField(const Eigen::Matrix3d& compliance) : a_(compliance) {
-        // a11 s^4 - 2 a16 s^3 + (2 a12 + a66) s^2 - 2 a26 s + a22 = 0, for s over the fourth root of a22 / a11.
-        const double size = std::sqrt(std::sqrt(a_(1, 1) / a_(0, 0)));
-        const double share = 1.0 / (a_(0, 0) * size * size);
-        Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
-        companion.diagonal(-1).setOnes();
-        companion.col(3) << -1.0, 2.0 * a_(1, 2) * share / size, -(2.0 * a_(0, 1) + a_(2, 2)) * share, 2.0 * a_(0, 2) * share * size;
-        const Eigen::Vector4cd roots = companion.eigenvalues();
-        int found = 0;
-        for (const Complex& each : roots)
-            if (each.imag() > 0.0 && found < 2) s_[found++] = size * each;
-    }
+    explicit NearTipField(const Eigen::Matrix3d& compliance);
 
     struct Mode {
         Mat2 gradient;                     // du_i / dx_j
@@ -47,8 +33,8 @@ class NearTipField {
         const double scale = 1.0 / std::sqrt(2.0 * std::numbers::pi);
         const double x = r * std::cos(angle), y = r * std::sin(angle);
         const auto& [s1, s2] = s_;
-        const Complex q1 = 1.0 / root(x, y, s1, angle);  // z_k^-1/2
-        const Complex q2 = 1.0 / root(x, y, s2, angle);
+        const Complex q1 = inverse_root(x + s1 * y, angle);
+        const Complex q2 = inverse_root(x + s2 * y, angle);
         const Complex q1_cubed = q1 * q1 * q1;
         const Complex q = -y * q1 * q1 * q2 * q2 / (q1 + q2);  // [q]
         // dq_k / dx = -q_k^3 / 2 and dq_k / dy = s_k dq_k / dx.
@@ -86,12 +72,11 @@ class NearTipField {
     Eigen::Vector3d strain(const Mat2& stress) const { return a_ * Eigen::Vector3d(stress(0, 0), stress(1, 1), stress(0, 1)); }
 
   private:
-    // z^1/2, on the sheet of the angle: z and the place itself lie in the same half plane.
-    static Complex root(double x, double y, const Complex& s, double angle) {
-        const Complex z = x + s * y;
-        const double principal = std::arg(z);
-        const double turn = 2.0 * std::numbers::pi;
-        return std::polar(std::sqrt(std::abs(z)), 0.5 * (principal + turn * std::round((angle - principal) / turn)));
+    // z^-1/2. z and the place itself lie in the same half plane, so that both pass on to the next sheet together.
+    static Complex inverse_root(const Complex& z, double angle) {
+        const Complex root = std::sqrt(z);
+        const Complex inverse = std::conj(root) / std::norm(root);
+        return std::abs(angle) > std::numbers::pi ? -inverse : inverse;
     }
 
     // Both modes' stress times (2 pi)^1/2, with q1 and [q] of q = z^-1/2 or of a derivative of it:
@@ -112,8 +97,6 @@ class NearTipField {
 };
 
 /// Of wood of this stiffness in x, y, for a crack that runs in this direction.
-inline NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead) {
-    return NearTipField(in_axes(stiffness, ahead).inverse());
-}
+NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead);
 
 } // namespace crampfit

@@ -144,3 +144,40 @@ traction = ["0 MPa", "1 MPa"]
 [stop]
 time = "1 ms"
 )";
+
+/// Orthotropic transition wood between two woods, in plane strain.
+inline const std::string orthotropic_scene = R"([model]
+plane = "strain"
+thickness = "10 mm"
+cell = "0.1 mm"
+
+[specimen]
+size = ["10 mm", "10 mm"]
+rings = { pith = ["-20 mm", "5 mm"], period = "2.2 mm", latewood_fraction = 0.25, transition = "0.3 mm" }
+density_exponents = { E_T = 2.5, toughness = 1.5 }
+
+[materials.EW]
+kind = "orthotropic"
+E_R = "800 MPa"
+E_T = "400 MPa"
+G_RT = "40 MPa"
+nu_RT = 0.45
+E_L = "11 GPa"
+nu_LR = 0.4
+nu_LT = 0.45
+density = "300 kg/m^3"
+toughness = "100 J/m^2"
+
+[materials.LW]
+E = "1200 MPa"
+nu = 0.3
+density = "900 kg/m^3"
+toughness = "300 J/m^2"
+
+[[edges]]
+side = "top"
+traction = ["0 MPa", "1 MPa"]
+
+[stop]
+time = "1 ms"
+)";

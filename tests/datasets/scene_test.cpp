@@ -404,10 +404,69 @@ TEST(UnitScene, KeysThatDoNotGoTogether) {
     });
 }
 
+TEST(UnitScene, OrthotropicWood) {
+    const SceneFolder folder;
+    const Scene scene = folder.parse(orthotropic_scene);
+    const OrthotropicElasticity& wood = *scene.materials.at("EW").orthotropic;
+    EXPECT_DOUBLE_EQ(wood.E_R, 800e6);
+    EXPECT_DOUBLE_EQ(wood.E_T, 400e6);
+    EXPECT_DOUBLE_EQ(wood.G_RT, 40e6);
+    EXPECT_DOUBLE_EQ(wood.nu_RT, 0.45);
+    EXPECT_DOUBLE_EQ(wood.E_L, 11e9);
+    EXPECT_DOUBLE_EQ(wood.nu_LR, 0.4);
+    EXPECT_DOUBLE_EQ(wood.nu_LT, 0.45);
+    EXPECT_FALSE(scene.materials.at("LW").orthotropic);
+    const DensityExponents& exponents = scene.specimen.density_exponents;
+    EXPECT_DOUBLE_EQ(exponents.E_T, 2.5);
+    EXPECT_DOUBLE_EQ(exponents.E_R, 1.0);
+    EXPECT_DOUBLE_EQ(*exponents.toughness, 1.5);
+    EXPECT_FALSE(exponents.E);
+    // In plane stress the constants along L may be left out.
+    const std::string stress = replaced(orthotropic_scene, "\"strain\"", "\"stress\"");
+    EXPECT_EQ(folder.parse(replaced(stress, "E_L = \"11 GPa\"\nnu_LR = 0.4\nnu_LT = 0.45\n", "")).materials.at("EW").orthotropic->E_L, 0);
+    // A direction for wood without rings.
+    const std::string rings = orthotropic_scene.substr(orthotropic_scene.find("rings"), orthotropic_scene.find("density_exp") - orthotropic_scene.find("rings"));
+    EXPECT_DOUBLE_EQ(*folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\nradial = \"90 deg\"\n")).specimen.radial, M_PI / 2);
+    EXPECT_DOUBLE_EQ(folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\npith = [\"1 m\", \"2 m\"]\n")).specimen.pith->y(), 2);
+    expect_errors({
+        {orthotropic_scene, "E_R = \"800 MPa\"", "E_R = \"0 MPa\"", "materials.EW.E_R", "greater than 0"},
+        {orthotropic_scene, "G_RT = \"40 MPa\"\n", "", "materials.EW.G_RT", "missing key"},
+        {orthotropic_scene, "E_L = \"11 GPa\"\n", "", "materials.EW.E_L", "missing key"},
+        {orthotropic_scene, "nu_RT", "nu_TR", "materials.EW.nu_TR", "give nu_RT = nu_TR E_R / E_T instead"},
+        {orthotropic_scene, "G_RT", "E", "materials.EW.E", "unknown key"},
+        {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.4143", "materials.EW.nu_RT", "between -1.414 and 1.414, the root of E_R / E_T"},
+        {orthotropic_scene, "nu_LR = 0.4", "nu_LR = -3.8", "materials.EW.nu_LR", "the root of E_L / E_R"},
+        {orthotropic_scene, "nu_LT = 0.45", "nu_LT = 5.3", "materials.EW.nu_LT", "the root of E_L / E_T"},
+        {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.413", "materials.EW.nu_RT", "too large together"},
+        {orthotropic_scene, "E_T = 2.5", "E_T = 0", "specimen.density_exponents.E_T", "greater than 0"},
+        {orthotropic_scene, "E_T = 2.5", "rho = 2", "specimen.density_exponents.rho", "unknown key"},
+        {orthotropic_scene, "density_exponents", "radial = \"0 deg\"\ndensity_exponents", "specimen.radial", "pith of their own"},
+        {orthotropic_scene, rings, "material = \"EW\"\n", "specimen.material", "give its radial direction"},
+        {orthotropic_scene, rings, "material = \"EW\"\npith = [\"1 m\", \"2 m\"]\nradial = \"1 deg\"\n", "specimen.pith",
+         "one of radial and pith"},
+    });
+}
+
+TEST(UnitScene, OrthotropicConstantsAreNumbersThatAFitMayAdjust) {
+    Scene scene = SceneFolder().parse(orthotropic_scene);
+    for (const char* key : {"E_R", "E_T", "G_RT", "nu_RT", "E_L", "nu_LR", "nu_LT"}) {
+        const std::string full = std::string("materials.EW.") + key;
+        const double value = 1.01 * get_number(scene, full);
+        set_number(scene, full, value);
+        EXPECT_DOUBLE_EQ(get_number(scene, full), value);
+    }
+    set_number(scene, "specimen.density_exponents.E_T", 3);
+    EXPECT_DOUBLE_EQ(scene.specimen.density_exponents.E_T, 3);
+    EXPECT_THROW(set_number(scene, "materials.EW.E", 1e6), InputError);
+    EXPECT_THROW(set_number(scene, "specimen.density_exponents.E", 1), InputError);  // not given: no number there
+    EXPECT_THROW(set_number(scene, "materials.EW.E_T", 1e10), InputError);          // breaks the limit of nu_RT
+    EXPECT_DOUBLE_EQ(scene.materials.at("EW").orthotropic->E_T, 404e6);             // and left as it was
+}
+
 TEST(UnitScene, NotSupportedYet) {
     expect_errors({
         {ring_scene, "cell = \"0.1 mm\"", "error = \"2 %\"", "model.error", "not supported yet"},
-        {ring_scene, "\"isotropic\"", "\"orthotropic\"", "materials.EW.kind", "not supported yet"},
+        {ring_scene, "\"isotropic\"", "\"viscoelastic\"", "materials.EW.kind", "not supported yet"},
         {ring_scene, "\"isotropic\"", "\"plastic\"", "materials.EW.kind", "not supported yet"},
         {ring_scene, "\"-1 mm/min\"", "\"free\"", "bodies.left wheel.velocity.1", "not supported yet"},
         {ring_scene, "contact = \"bonded\"", "force = [\"0 N\", \"1 N\"]", "bodies.body 1.force", "not supported yet"},

@@ -5,6 +5,7 @@
 #include "tests/forward/cracked_plates.hpp"
 #include "tests/forward/laminated_strip.hpp"
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <algorithm>
