@@ -13,6 +13,7 @@ namespace crampfit::test {
 inline void hard_case(const std::string& what, const std::string& criterion, double off, double bar, double reached = 0.0) {
     const bool good = std::abs(off) <= bar;  // not for NaN
     std::printf("%-52s | %-62s | off by %+9.2e, bar %.0e | %s\n", what.c_str(), criterion.c_str(), off, bar, good ? "good" : "MISSED");
+    std::fflush(stdout);  // a table is of use up to where a crash cuts it off
     EXPECT_TRUE(good || std::abs(off) <= reached) << what << ": " << criterion << ", off by " << off << ", bar " << bar;
 }
 
