@@ -18,5 +18,6 @@ Verb simulate_verb(CLI::App& command, const CommonOptions& common);
 Verb explain_verb(CLI::App& command, const CommonOptions& common);
 Verb fit_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
+Verb bench_verb(CLI::App& command, const CommonOptions& common);
 
 }  // namespace crampfit::cli

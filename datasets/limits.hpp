@@ -32,6 +32,7 @@ constexpr NumberRule finite(const Dimension& dimension) {
 
 inline constexpr NumberRule thickness = positive(dimension::length);
 inline constexpr NumberRule cell = positive(dimension::length);
+inline constexpr NumberRule asked_error = {dimension::number, 0, 1, true, "must be between 0 and 100 %"};
 inline constexpr NumberRule size = positive(dimension::length);
 inline constexpr NumberRule radius = positive(dimension::length);
 inline constexpr NumberRule coordinate = finite(dimension::length);

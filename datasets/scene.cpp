@@ -81,14 +81,18 @@ Measure read_measure(const Scene& scene, const Entry& root) {
 
 Model read_model(const Entry& entry) {
     entry.only({"plane", "thickness", "cell", "error", "points_per_cell"});
-    if (const auto error = entry.find("error")) {
-        error->fail("choosing the cell from an error is not supported yet: give the cell");
-    }
     Model model;
     model.plane = entry.at("plane").choice<PlaneCondition>(
         {{"strain", PlaneCondition::strain}, {"stress", PlaneCondition::stress}});
     model.thickness = entry.at("thickness").number(limits::thickness);
-    model.cell = entry.at("cell").number(limits::cell);
+    if (const auto error = entry.find("error")) {
+        if (entry.find("cell")) {
+            error->fail("give either the cell or the error that it is chosen for");
+        }
+        model.error = error->number(limits::asked_error);
+    } else {
+        model.cell = entry.at("cell").number(limits::cell);
+    }
     if (const auto points = entry.find("points_per_cell")) {
         model.points_per_cell = points->integer(1, 25);
         bool square = false;

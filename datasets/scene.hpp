@@ -33,8 +33,9 @@ enum class PlaneCondition { strain, stress };
 struct Model {
     PlaneCondition plane = PlaneCondition::strain;
     double thickness = 0.0;      // [m]
-    double cell = 0.0;           // grid spacing [m]
+    double cell = 0.0;           // grid spacing [m]; 0: to be chosen so that `error` is met
     int points_per_cell = 4;     // a square number: 1, 4, 9, 16
+    double error = 0.0;          // asked for in place of the cell, relative
 };
 
 /// Growth rings from geometry: with r the distance to the pith, LW where frac(r / period) > 1 - latewood_fraction.

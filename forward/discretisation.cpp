@@ -68,6 +68,9 @@ Eigen::Vector3d stress_out_of_plane(const LocalWood& wood) {
 } // namespace
 
 Layout Layout::of(const Scene& scene) {
+    if (!(scene.model.cell > 0.0))
+        throw InputError(scene.file.string(), "model.error", std::to_string(scene.model.error),
+                         "the cell is chosen for a single simulation only; runs that are compared share a grid: give model.cell");
     Layout layout;
     const auto count = [&](double length) { return std::max(1, static_cast<int>(std::lround(length / scene.model.cell))); };
     layout.cells_x = count(scene.specimen.size.x());

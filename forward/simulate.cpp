@@ -1,6 +1,7 @@
 #include "forward/simulate.hpp"
 
 #include "forward/explicit.hpp"
+#include "forward/grid_choice.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/recorder.hpp"
 #include "forward/trace.hpp"
@@ -122,9 +123,21 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     return recorder.take();
 }
 
+Scene with_cell(Scene scene, double cell) {
+    scene.model.cell = cell;
+    return scene;
+}
+
 } // namespace
 
 Record simulate(const Scene& scene, const SimulateOptions& options) {
+    if (scene.model.cell == 0.0) {
+        const GridChoice choice = choose_grid(scene, scene.model.error);
+        Record record = simulate(with_cell(scene, choice.cell), options);
+        record.explanation += choice.text;
+        record.seconds += choice.seconds_spent;
+        return record;
+    }
     const auto start = std::chrono::steady_clock::now();
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
@@ -138,6 +151,10 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
 }
 
 std::string explain(const Scene& scene) {
+    if (scene.model.cell == 0.0) {
+        const GridChoice choice = choose_grid(scene, scene.model.error);
+        return explain(with_cell(scene, choice.cell)) + choice.text;
+    }
     const MaterialMap materials(scene);
     const Discretisation body(scene, materials);
     return describe(scene, make_plan(scene, materials, body), body);

@@ -21,6 +21,7 @@ struct SimulateOptions {
 };
 
 /// Runs one scene, on one core: a fit runs several side by side. A picture or specimen file must have been read into `scene.specimen.map` before.
+/// Where the scene gives an error in place of a cell, its grid is chosen first (`choose_grid`), and the record's explanation says how.
 /// Throws InputError when the scene asks for what no solver here does. A run that goes unstable is a status.
 Record simulate(const Scene& scene, const SimulateOptions& options = {});
 

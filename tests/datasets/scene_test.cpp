@@ -465,7 +465,9 @@ TEST(UnitScene, OrthotropicConstantsAreNumbersThatAFitMayAdjust) {
 
 TEST(UnitScene, NotSupportedYet) {
     expect_errors({
-        {ring_scene, "cell = \"0.1 mm\"", "error = \"2 %\"", "model.error", "not supported yet"},
+        {ring_scene, "cell = \"0.1 mm\"", "cell = \"0.1 mm\"\nerror = \"2 %\"", "model.error", "either"},
+        {ring_scene, "cell = \"0.1 mm\"", "error = \"0 %\"", "model.error", "between"},
+        {ring_scene, "cell = \"0.1 mm\"", "error = \"2 mm\"", "model.error", ""},
         {ring_scene, "\"isotropic\"", "\"viscoelastic\"", "materials.EW.kind", "not supported yet"},
         {ring_scene, "\"isotropic\"", "\"plastic\"", "materials.EW.kind", "not supported yet"},
         {ring_scene, "\"-1 mm/min\"", "\"free\"", "bodies.left wheel.velocity.1", "not supported yet"},

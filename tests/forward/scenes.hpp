@@ -1,5 +1,6 @@
 #pragma once
 
+#include "benchmarks/reference_scenes.hpp"
 #include "forward/equilibrium.hpp"
 #include "forward/explicit.hpp"
 #include "forward/simulate.hpp"
@@ -10,34 +11,9 @@
 
 namespace crampfit::test {
 
+using namespace crampfit::reference;
+
 inline Material earlywood() { return {40e6, 0.33, 300.0, 100.0}; }
-
-inline Edge moving(std::string name, Side side, Vec2 velocity) {
-    Edge edge;
-    edge.name = std::move(name);
-    edge.side = side;
-    edge.velocity = {velocity.x(), velocity.y()};
-    return edge;
-}
-
-inline Edge pulled(std::string name, Side side, Vec2 traction) {
-    Edge edge;
-    edge.name = std::move(name);
-    edge.side = side;
-    edge.traction = traction;
-    return edge;
-}
-
-/// A rectangle of earlywood, 1 m thick, that nothing loads yet.
-inline Scene block(Vec2 size, double cell) {
-    Scene scene;
-    scene.model = {PlaneCondition::strain, 1.0, cell, 4};
-    scene.specimen.size = size;
-    scene.specimen.material = "EW";
-    scene.materials["EW"] = earlywood();
-    scene.file = "test.toml";
-    return scene;
-}
 
 /// Everything that a run needs, kept together so that a test can step through it.
 struct Trial {
@@ -82,12 +58,6 @@ inline Scene at_equilibrium(Scene scene) {
     scene.solver.kind = SolverKind::quasistatic;
     scene.solver.damping = 0.0;
     return scene;
-}
-
-/// A component that an edge leaves free.
-inline Edge without(Edge edge, int axis) {
-    edge.velocity[axis].reset();
-    return edge;
 }
 
 /// The ring specimen of the finite-element reference: 10 x 10 mm, pulled by 0.1 mm, edge crack of length a from the right. The

@@ -2,6 +2,7 @@
 // with two points along each side of a cell.
 #include "forward/growth.hpp"
 #include "forward/near_tip_field.hpp"
+#include "benchmarks/reference_problems.hpp"
 #include "tests/forward/cracked_plates.hpp"
 #include "tests/forward/laminated_strip.hpp"
 
@@ -270,24 +271,10 @@ void report(const char* name, const TipLoad& load, double K) {
 
 TEST(VerificationHandbook, EdgeCrackInTension) {
     // Ends free to rotate, 20 cells per crack length; Tada, Paris and Irwin's secant form, good to 0.5 % at any length.
-    const double a = 10e-3, h = a / 20, stress = 1e5;
     for (const double r : {0.2, 0.4, 0.5}) {
-        const double W = a / r, H = 3 * W;
-        Scene scene = at_rest({W, H}, h);
-        // Two neighbours on the far side hold it: the load is in balance, they feel nothing.
-        scene.edges = {pulled("top", Side::top, {0.0, stress}), pulled("bottom", Side::bottom, {0.0, -stress}),
-                       held_at("hinge", Side::right, 0.5 * H, h, 0.0, 0.0),
-                       held_at("slide", Side::right, 0.5 * H - h, h, 0.0, std::nullopt)};
-        Crack crack;
-        crack.points = {Vec2(0.0, 0.5 * H), Vec2(a, 0.5 * H)};
-        scene.cracks = {crack};
-        scene.measure = {"top", "top"};
-        const AtRest run(scene);
+        const AtRest run(edge_crack(20.0, r, 4));
         ASSERT_TRUE(run.solved());
-        const double angle = 0.5 * std::numbers::pi * r;
-        const double F = std::sqrt(std::tan(angle) / angle) / std::cos(angle) *
-                         (0.752 + 2.02 * r + 0.37 * std::pow(1 - std::sin(angle), 3));
-        report("edge crack", run.load(), stress * std::sqrt(std::numbers::pi * a) * F);
+        report("edge crack", run.load(), edge_crack_K(r));
     }
 }
 
@@ -333,20 +320,9 @@ TEST(VerificationHandbook, CompactTension) {
 
 TEST(VerificationHandbook, DoubleCantileverBeam) {
     // REFERENCES: 100 x 24 mm, tip at 51 mm, E = 100 kPa, P / B = 0.4 N/m at 99.5 mm, plane strain. Asked: 1 % of G.
-    const double h = 1e-3, P = 0.4, arm = 12e-3, a = 48.5e-3;
-    Scene scene = at_rest({100e-3, 2 * arm}, h);
-    scene.materials["EW"] = {1e5, 0.33, 300.0, 100.0};
-    scene.edges = {pulled("up", Side::top, {0.0, P / h}), pulled("down", Side::bottom, {0.0, -P / h}),
-                   held_at("hinge", Side::left, arm, h, 0.0, 0.0), held_at("slide", Side::left, arm + h, h, 0.0, std::nullopt)};
-    scene.edges[0].range = scene.edges[1].range = {{99e-3, 100e-3}};
-    Crack crack;
-    crack.points = {Vec2(100e-3, arm), Vec2(51e-3, arm)};
-    scene.cracks = {crack};
-    scene.measure = {"up", "up"};
-    const AtRest run(scene);
+    const AtRest run(double_cantilever(12.0, 4));
     ASSERT_TRUE(run.solved());
-    const double E = 1e5 / (1 - 0.33 * 0.33);
-    const double G = 12 * P * P * a * a / (E * arm * arm * arm) * std::pow(1 + 0.677 * arm / a, 2);
+    const double E = 1e5 / (1 - 0.33 * 0.33), G = double_cantilever_G();
     const TipLoad load = run.load();
     std::printf("double cantilever beam: G off by %+.2f %%, by K_I %+.2f %%\n", 100 * (load.G / G - 1),
                 100 * (load.K_I * load.K_I / E / G - 1));

@@ -1,0 +1,168 @@
+#include "forward/grid_choice.hpp"
+
+#include "datasets/error.hpp"
+#include "forward/plan.hpp"
+#include "forward/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+
+namespace crampfit {
+
+namespace {
+
+constexpr double cells_of_coarsest = 16;    // across the smaller side
+constexpr double most_cells_tried = 128;
+constexpr double most_cells_chosen = 512;
+constexpr int multiple = 4;                 // of cells: places on lines of the grids tried lie on lines of the chosen one
+constexpr double safety = 1.25;             // Roache's, for three grids
+constexpr double least_power = 0.5;
+constexpr double most_power = 2.0;
+constexpr double power_of_time = 3.0;       // of cells to a side: cells times stations or factorisation
+
+struct Quantity {
+    std::string name;
+    double value;
+};
+
+struct Trial {
+    double cells;                        // across the smaller side
+    std::vector<Quantity> quantities;
+    double seconds;
+};
+
+Scene with_cells(Scene scene, double cells) {
+    scene.model.cell = scene.specimen.size.minCoeff() / cells;
+    return scene;
+}
+
+std::vector<Quantity> quantities_of(const Record& record) {
+    std::vector<Quantity> found;
+    if (record.series.empty()) return found;
+    const double start = record.series.front().crack_length;
+    const Instant* loaded = nullptr;
+    double largest = 0.0;
+    for (const Instant& row : record.series) {
+        if (row.crack_length <= start * (1.0 + 1e-9) && row.displacement != 0.0) loaded = &row;
+        largest = std::max(largest, row.force);
+    }
+    if (loaded && loaded->force != 0.0) found.push_back({"force over displacement before growth", loaded->force / loaded->displacement});
+    if (record.driving.empty()) {
+        if (record.series.back().G > 0.0) found.push_back({"energy release rate", record.series.back().G});
+    } else {
+        found.push_back({"displacement at first growth", record.driving.front().displacement});
+        if (largest > 0.0) found.push_back({"largest force", largest});
+    }
+    return found;
+}
+
+// Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, or no equilibrium is found.
+std::optional<Trial> try_grid(const Scene& scene, double cells) {
+    Scene coarse = with_cells(scene, cells);
+    coarse.output.frames = 0;
+    coarse.output.samples = 50;
+    coarse.solver.extrapolate = false;  // or the change from grid to grid would not tell the error
+    try {
+        const Record record = simulate(coarse);
+        Trial trial{cells, quantities_of(record), record.seconds};
+        const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(), [](const Quantity& q) { return std::isfinite(q.value); });
+        if (record.status == RunStatus::unstable || trial.quantities.empty() || !good) return {};
+        return trial;
+    } catch (const InputError&) {
+        return {};
+    }
+}
+
+// Error of a quantity as a power of the cell.
+struct Estimate {
+    std::string name;
+    double at_finest;
+    double power;
+    double cells;
+
+    double at(double other_cells) const { return at_finest * std::pow(cells / other_cells, power); }
+};
+
+// Of what all three grids know.
+std::vector<Estimate> estimates_of(const Trial& coarse, const Trial& middle, const Trial& fine) {
+    std::vector<Estimate> found;
+    for (const Quantity& q : fine.quantities) {
+        const auto in = [&](const Trial& trial) {
+            return std::find_if(trial.quantities.begin(), trial.quantities.end(), [&](const Quantity& o) { return o.name == q.name; });
+        };
+        const auto a = in(coarse), b = in(middle);
+        if (a == coarse.quantities.end() || b == middle.quantities.end() || q.value == 0.0) continue;
+        const double first = std::abs((a->value - b->value) / q.value), second = std::abs((b->value - q.value) / q.value);
+        const double power = second == 0.0 ? most_power : std::clamp(std::log2(first / second), least_power, most_power);
+        found.push_back({q.name, safety * second / (std::pow(2.0, power) - 1.0), power, fine.cells});
+    }
+    return found;
+}
+
+const Estimate& worst_of(const std::vector<Estimate>& estimates, double cells) {
+    return *std::max_element(estimates.begin(), estimates.end(), [&](const Estimate& a, const Estimate& b) { return a.at(cells) < b.at(cells); });
+}
+
+// The fewest cells that meet the error; more than `most_cells_chosen` where none do.
+double fewest_cells(const std::vector<Estimate>& estimates, double asked) {
+    double cells = cells_of_coarsest;
+    while (cells <= most_cells_chosen && worst_of(estimates, cells).at(cells) > asked) cells += multiple;
+    return cells;
+}
+
+[[noreturn]] void refuse(const Scene& scene, double error, const std::string& rule) {
+    throw InputError(scene.file.string(), "model.error", fmt::format("{:g} %", 100 * error), rule);
+}
+
+void require_equilibrium(const Scene& scene, double error) {
+    const Scene coarse = with_cells(scene, 2 * cells_of_coarsest);
+    const MaterialMap materials(coarse);
+    const Discretisation body(coarse, materials);
+    if (!make_plan(coarse, materials, body).quasistatic)
+        refuse(scene, error, "the cell is chosen at equilibrium only; explicit dynamics has errors of time and inertia too: give model.cell");
+}
+
+} // namespace
+
+GridChoice choose_grid(const Scene& scene, double error) {
+    require_equilibrium(scene, error);
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<Trial> trials;
+    std::vector<Estimate> estimates;
+    double chosen = most_cells_chosen + multiple;
+    for (double cells = cells_of_coarsest; cells <= most_cells_tried; cells *= 2.0) {
+        const auto trial = try_grid(scene, cells);
+        if (!trial) {
+            trials.clear();
+            continue;
+        }
+        trials.push_back(*trial);
+        const std::size_t n = trials.size();
+        if (n < 3) continue;
+        estimates = estimates_of(trials[n - 3], trials[n - 2], trials[n - 1]);
+        if (estimates.empty()) continue;
+        chosen = std::max(fewest_cells(estimates, error), trials.front().cells);
+        if (chosen <= 2.0 * cells) break;  // else so far beyond the grids tried that one more is worth it
+    }
+    if (estimates.empty()) refuse(scene, error, fmt::format("not three of the grids with 16 to {:g} cells across gave a result to compare: give model.cell", most_cells_tried));
+    if (chosen > most_cells_chosen)
+        refuse(scene, error, fmt::format("{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell", most_cells_chosen,
+                                  100 * worst_of(estimates, most_cells_chosen).at(most_cells_chosen), worst_of(estimates, most_cells_chosen).name));
+    const Estimate& worst = worst_of(estimates, chosen);
+    GridChoice choice;
+    choice.cell = scene.specimen.size.minCoeff() / chosen;
+    choice.error = worst.at(chosen);
+    choice.quantity = worst.name;
+    choice.seconds = trials.back().seconds * std::pow(chosen / trials.back().cells, power_of_time);
+    choice.seconds_spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    choice.text = fmt::format("{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "
+                              "from grid to grid, going with the power {:.2g} of the cell\n{:<15} about {:.2g} s for the whole run\n",
+                              "error", 100 * choice.error, choice.quantity, 100 * error, "", chosen, worst.power, "", choice.seconds);
+    return choice;
+}
+
+} // namespace crampfit
