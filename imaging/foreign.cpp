@@ -1,0 +1,105 @@
+#include "imaging/foreign.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+namespace {
+
+constexpr double too_dark = 0.25;  // below LW, of the contrast
+constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than white light
+constexpr double too_green = 0.04; // green above red and blue
+
+double number(Feature feature) { return static_cast<double>(feature); }
+
+cv::Mat disk(double radius) {
+    const int size = 2 * static_cast<int>(std::lround(radius)) + 1;
+    return cv::getStructuringElement(cv::MORPH_ELLIPSE, {size, size});
+}
+
+/// 255 where hue cannot be wood's.
+cv::Mat strange_hue(const cv::Mat& bgr, cv::Size size) {
+    if (bgr.empty())
+        return cv::Mat::zeros(size, CV_8U);
+    cv::Mat smooth;
+    cv::GaussianBlur(bgr, smooth, {}, 1.5);
+    cv::Mat channel[3];
+    cv::split(smooth, channel);
+    return ((channel[0] - channel[2]) > too_blue) |
+           (((channel[1] - channel[2]) > too_green) & ((channel[1] - channel[0]) > too_green));
+}
+
+/// Calls `visit(patch number, figures)` for every connected patch of a mask.
+template <class Visit> cv::Mat for_patches(const cv::Mat& mask, const Visit& visit) {
+    cv::Mat patches, figures, centres;
+    const int count = cv::connectedComponentsWithStats(mask, patches, figures, centres, 8);
+    for (int i = 1; i < count; ++i)
+        visit(i, figures.ptr<int>(i));
+    return patches;
+}
+
+bool touches_edge(const int* box, cv::Size size) {
+    return box[cv::CC_STAT_LEFT] == 0 || box[cv::CC_STAT_TOP] == 0 ||
+           box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] == size.width ||
+           box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] == size.height;
+}
+
+/// The patches that `wanted(figures)` picks.
+template <class Wanted> cv::Mat pick(const cv::Mat& mask, const Wanted& wanted) {
+    std::vector<std::uint8_t> chosen{0};
+    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { chosen.push_back(wanted(box) ? 255 : 0); });
+    cv::Mat picked(mask.size(), CV_8U);
+    for (int v = 0; v < mask.rows; ++v)
+        for (int u = 0; u < mask.cols; ++u)
+            picked.at<std::uint8_t>(v, u) = chosen[patches.at<int>(v, u)];
+    return picked;
+}
+
+cv::Mat find_background(const cv::Mat& strange, double width) {
+    cv::Mat wide;
+    cv::morphologyEx(strange, wide, cv::MORPH_OPEN, disk(std::max(1.0, 0.12 * width)));
+    cv::morphologyEx(wide, wide, cv::MORPH_CLOSE, disk(std::max(1.0, 0.25 * width)));
+    const cv::Size size = strange.size();
+    cv::Mat background = pick(wide, [&](const int* box) {
+        return touches_edge(box, size) && box[cv::CC_STAT_AREA] > width * width;
+    });
+    if (cv::countNonZero(background) == 0)
+        return background;
+    const cv::Mat islands = pick(background == 0, [&](const int* box) { return box[cv::CC_STAT_AREA] < 6 * width * width; });
+    background.setTo(255, islands);
+    cv::dilate(background, background, disk(2));
+    return background;
+}
+
+}  // namespace
+
+cv::Mat find_foreign(const cv::Mat& gray, const cv::Mat& bgr, const WoodLevels& levels, double ring_width) {
+    cv::Mat features(gray.size(), CV_8U, cv::Scalar(number(Feature::wood)));
+    const double dark = levels.latewood - too_dark * levels.contrast();
+    const cv::Mat hue = strange_hue(bgr, gray.size());
+    cv::Mat smooth;
+    cv::GaussianBlur(gray, smooth, {}, std::max(1.0, 0.06 * ring_width));
+    const cv::Mat background = find_background((smooth < dark) | hue, ring_width);
+
+    cv::GaussianBlur(gray, smooth, {}, 0.7);
+    const cv::Mat rest = ((smooth < dark) | hue) & (background == 0);
+    const auto is_crack = [&](const int* box) {
+        const double length = box[cv::CC_STAT_HEIGHT], thickness = box[cv::CC_STAT_AREA] / length;
+        return length > std::max(8.0, 0.4 * ring_width) && thickness < 0.2 * length && thickness < 0.2 * ring_width;
+    };
+    features.setTo(number(Feature::mark), pick(rest, [&](const int* box) { return box[cv::CC_STAT_AREA] >= 4; }));
+    features.setTo(number(Feature::crack), pick(rest & (hue == 0), is_crack));
+    features.setTo(number(Feature::background), background);
+    return features;
+}
+
+cv::Mat countable(const cv::Mat& features) {
+    cv::Mat foreign, counts;
+    cv::dilate(features != number(Feature::wood), foreign, disk(1));
+    cv::Mat(foreign == 0).convertTo(counts, CV_32F, 1.0 / 255);
+    return counts;
+}
+
+}  // namespace crampfit
