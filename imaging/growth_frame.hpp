@@ -15,31 +15,9 @@ class GrowthFrame {
     bool across() const { return growth_ == GrowthAxis::right || growth_ == GrowthAxis::left; }
     cv::Size size() const { return across() ? cv::Size(picture_.height, picture_.width) : picture_; }
 
-    /// The pixels in the frame.
-    cv::Mat turn(const cv::Mat& picture) const {
-        cv::Mat turned = picture;
-        if (across())
-            cv::transpose(picture, turned);
-        if (backward()) {
-            cv::Mat flipped;
-            cv::flip(turned, flipped, 0);
-            return flipped;
-        }
-        return turned;
-    }
-
-    /// The pixels in the picture again.
-    cv::Mat turn_back(const cv::Mat& pixels) const {
-        cv::Mat turned = pixels;
-        if (backward())
-            cv::flip(pixels, turned, 0);
-        if (across()) {
-            cv::Mat transposed;
-            cv::transpose(turned, transposed);
-            return transposed;
-        }
-        return turned;
-    }
+    /// The pixels in the frame, and in the picture again. Always a copy or the very pixels, never changed in place.
+    cv::Mat turn(const cv::Mat& picture) const { return flip(transpose(picture)); }
+    cv::Mat turn_back(const cv::Mat& pixels) const { return transpose(flip(pixels)); }
 
     /// A place in the frame from one in the picture [pixels, centre of the first at 0,0], and back.
     cv::Point2d from_picture(const cv::Point2d& p) const {
@@ -59,6 +37,19 @@ class GrowthFrame {
 
   private:
     bool backward() const { return growth_ == GrowthAxis::left || growth_ == GrowthAxis::up; }
+
+    cv::Mat transpose(const cv::Mat& pixels) const {
+        cv::Mat turned;
+        if (across())
+            cv::transpose(pixels, turned);
+        return across() ? turned : pixels;
+    }
+    cv::Mat flip(const cv::Mat& pixels) const {
+        cv::Mat turned;
+        if (backward())
+            cv::flip(pixels, turned, 0);
+        return backward() ? turned : pixels;
+    }
 
     GrowthAxis growth_;
     cv::Size picture_;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <vector>
 
 namespace crampfit {
 namespace {
@@ -70,10 +72,25 @@ class Moments {
     cv::Mat kernels_[3];
 };
 
+int step_for(double integration) { return std::max(1, static_cast<int>(integration / 4)); }
+
+/// Length of the mean doubled vector, against the mean of its length.
+cv::Mat coherency_of(const Tensor& tensor, double integration) {
+    const int step = step_for(integration);
+    const Moments moments(integration / step);
+    const cv::Mat energy = moments(reduced(tensor.energy, step), 0, 0), c = moments(reduced(tensor.cos2, step), 0, 0),
+                  s = moments(reduced(tensor.sin2, step), 0, 0);
+    cv::Mat length, coherency;
+    cv::magnitude(c, s, length);
+    coherency = length / cv::max(energy, 1e-12);
+    cv::min(coherency, 1.0, coherency);
+    return coherency;
+}
+
 /// The first-order fit of the doubled vector at each lattice node.
 OrientationField fit(const Tensor& tensor, double integration) {
     OrientationField field;
-    const int step = std::max(1, static_cast<int>(integration / 4));
+    const int step = step_for(integration);
     field.step = step;
     const cv::Mat energy = reduced(tensor.energy, step), c = reduced(tensor.cos2, step),
                   s = reduced(tensor.sin2, step);
@@ -82,8 +99,9 @@ OrientationField fit(const Tensor& tensor, double integration) {
                   m20 = moments(energy, 2, 0), m11 = moments(energy, 1, 1), m02 = moments(energy, 0, 2);
     const cv::Mat c0 = moments(c, 0, 0), c1 = moments(c, 1, 0), c2 = moments(c, 0, 1);
     const cv::Mat s0 = moments(s, 0, 0), s1 = moments(s, 1, 0), s2 = moments(s, 0, 1);
-    for (cv::Mat* map : {&field.cos2, &field.sin2, &field.coherency})
+    for (cv::Mat* map : {&field.cos2, &field.sin2})
         *map = cv::Mat::zeros(energy.size(), CV_32F);
+    field.coherency = coherency_of(tensor, integration);
     for (int j = 0; j < energy.rows; ++j) {
         for (int i = 0; i < energy.cols; ++i) {
             const auto at = [i, j](const cv::Mat& map) { return static_cast<double>(map.at<float>(j, i)); };
@@ -102,7 +120,6 @@ OrientationField fit(const Tensor& tensor, double integration) {
                 continue;
             field.cos2.at<float>(j, i) = static_cast<float>(vector.x() / length);
             field.sin2.at<float>(j, i) = static_cast<float>(vector.y() / length);
-            field.coherency.at<float>(j, i) = static_cast<float>(std::min(1.0, std::hypot(at(c0), at(s0)) / mass));
         }
     }
     return field;
@@ -161,10 +178,33 @@ OrientationField measure_orientation(const cv::Mat& gray, const cv::Mat& valid, 
     Tensor tensor = gradients(gray, valid, scale.derivative);
     OrientationField field = fit(tensor, 2 * scale.integration);
     fill_in(field, 2 * scale.integration);
+    const cv::Mat coherency = coherency_of(tensor, scale.integration);
     trust_agreeing(tensor, field);
     field = fit(tensor, scale.integration);
     fill_in(field, scale.integration);
+    field.coherency = coherency;  // of what the picture shows, not of what was trusted
     return field;
+}
+
+bool holds_pith(const OrientationField& field) {
+    const int right = field.cos2.cols - 1, bottom = field.cos2.rows - 1;
+    std::vector<cv::Point> round;  // the lattice's outermost nodes, once around
+    for (int i = 0; i < right; ++i)
+        round.emplace_back(i, 0);
+    for (int j = 0; j < bottom; ++j)
+        round.emplace_back(right, j);
+    for (int i = right; i > 0; --i)
+        round.emplace_back(i, bottom);
+    for (int j = bottom; j > 0; --j)
+        round.emplace_back(0, j);
+    const auto angle = [&](std::size_t k) {
+        const cv::Point at = round[k % round.size()];
+        return std::atan2(field.sin2.at<float>(at), field.cos2.at<float>(at));
+    };
+    double turned = 0;
+    for (std::size_t k = 0; k < round.size(); ++k)
+        turned += std::remainder(angle(k + 1) - angle(k), 2 * std::numbers::pi);
+    return std::lround(std::abs(turned) / (2 * std::numbers::pi)) == 2;
 }
 
 }  // namespace crampfit

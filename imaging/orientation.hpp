@@ -27,4 +27,8 @@ struct OrientationScale {
 /// direction is filled in from around. `gray` is float; `valid` is 0 where a pixel must not count, or empty.
 OrientationField measure_orientation(const cv::Mat& gray, const cv::Mat& valid, const OrientationScale& scale);
 
+/// Whether radial directions turn once all around along the picture's edge: then the pith lies in the picture, and no
+/// axis is with the growth everywhere.
+bool holds_pith(const OrientationField& field);
+
 }  // namespace crampfit

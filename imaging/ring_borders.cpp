@@ -37,6 +37,7 @@ struct Profile {
     int column = 0;
     std::vector<float> gray;
     std::vector<char> known;
+    double first = 0, last = 0;  // rows at which the picture begins and ends
 };
 
 /// A rise of gray in a profile.
@@ -46,9 +47,12 @@ struct Rise {
     double room = 0;    // to the nearest other rise
 };
 
-Profile take_profile(const StraightPicture& straight, int column, double sigma) {
+Profile take_profile(const StraightPicture& straight, const RingCoordinate& rings, int column, double sigma,
+                     int frame_rows) {
     Profile profile;
     profile.column = column;
+    profile.first = rings.psi(column, 0) - rings.lowest();
+    profile.last = rings.psi(column, frame_rows - 1) - rings.lowest();
     cv::Mat gray, known;
     const cv::Mat weight = straight.known.col(column).clone();
     cv::GaussianBlur(straight.gray.col(column).mul(weight), gray, {1, 0}, sigma, sigma, cv::BORDER_CONSTANT);
@@ -182,14 +186,15 @@ void join(std::vector<Track>& tracks, const std::vector<Rise>& rises, int profil
     }
 }
 
-/// Share of the profiles that show the track, among those that could.
+/// Share of the profiles that show the track, among those that its level meets within the picture: what shows in less
+/// than half of them is a chip or chance.
 double support_of(const Track& track, const std::vector<Profile>& profiles) {
-    int could = 0;
+    int within = 0;
     for (std::size_t k = 0; k < profiles.size(); ++k) {
-        const int row = static_cast<int>(std::lround(track.row_at(static_cast<double>(k))));
-        could += row >= 0 && row < static_cast<int>(profiles[k].known.size()) && profiles[k].known[row];
+        const double row = track.row_at(static_cast<double>(k));
+        within += row >= profiles[k].first && row <= profiles[k].last;
     }
-    return static_cast<double>(track.profile.size()) / std::max(could, 1);
+    return static_cast<double>(track.profile.size()) / std::max(within, 1);
 }
 
 double mean_distance(const Track& a, const Track& b) {
@@ -285,27 +290,23 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, 
     return {rows.begin<float>(), rows.end<float>()};
 }
 
-}  // namespace
-
-StraightPicture straighten(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double along) {
-    StraightPicture straight;
-    straight.known = blur_along(rings.straighten(valid), along);
-    straight.gray = blur_along(rings.straighten(gray.mul(valid)), along) / cv::max(straight.known, 1e-6);
-    return straight;
+/// Profiles across the rings, each a blurred stretch of them apart.
+std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                   double ring_width) {
+    const double most = ring_width > 0 ? std::max(2.0, 0.4 * ring_width) : 20;
+    const double along = std::clamp(gray.cols / 60.0, 1.0, most);
+    const double across = ring_width > 0 ? std::clamp(0.04 * ring_width, 1.0, 4.0) : 1.5;
+    const StraightPicture straight = straighten(gray, valid, rings, along);
+    const int count = std::max(1, static_cast<int>(gray.cols / (2 * along)));
+    std::vector<Profile> profiles;
+    for (int k = 0; k < count; ++k)
+        profiles.push_back(
+            take_profile(straight, rings, static_cast<int>((k + 0.5) * gray.cols / count), across, gray.rows));
+    return profiles;
 }
 
-std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
-                                          double ring_width) {
-    const int columns = gray.cols;
-    const double most = ring_width > 0 ? std::max(2.0, 0.4 * ring_width) : 20;
-    const double along = std::clamp(columns / 60.0, 1.0, most);
-    const StraightPicture straight = straighten(gray, valid, rings, along);
-    const double across = ring_width > 0 ? std::clamp(0.04 * ring_width, 1.0, 4.0) : 1.5;
-    std::vector<Profile> profiles;
-    const int count = std::max(1, static_cast<int>(columns / (2 * along)));
-    for (int k = 0; k < count; ++k)
-        profiles.push_back(take_profile(straight, static_cast<int>((k + 0.5) * columns / count), across));
-
+/// Every track there is through the profiles.
+std::vector<Track> follow(const std::vector<Profile>& profiles, double ring_width) {
     std::vector<std::vector<double>> contrasts;
     std::vector<float> all;
     for (const Profile& profile : profiles) {
@@ -318,43 +319,75 @@ std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& va
     }
     const double floor = least_contrast * quantile(all, 0.5);
     std::vector<Track> tracks;
-    for (std::size_t k = 0; k < profiles.size(); ++k)
-        join(tracks, find_rises(profiles[k], [&](int row) {
-                 return least_prominence * std::max(contrasts[k][row], floor) + 1e-6;
-             }), static_cast<int>(k));
-    const std::vector<Track> kept = keep(std::move(tracks), profiles);
+    for (std::size_t k = 0; k < profiles.size(); ++k) {
+        const auto least = [&](int row) { return least_prominence * std::max(contrasts[k][row], floor) + 1e-6; };
+        join(tracks, find_rises(profiles[k], least), static_cast<int>(k));
+    }
+    return tracks;
+}
 
-    StraightPicture fine = straighten(gray, valid, rings, 2.0);
-    cv::Mat slope;
-    cv::GaussianBlur(fine.gray, slope, {1, 0}, 1.0, 1.0);
-    cv::sepFilter2D(slope, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
-    cv::Mat unknown;
+/// How gray rises down the columns of the finely straightened picture; 0 where that is not known.
+cv::Mat slope_across(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
+    const StraightPicture fine = straighten(gray, valid, rings, 2.0);
+    cv::Mat smooth, slope, unknown;
+    cv::GaussianBlur(fine.gray, smooth, {1, 0}, 1.0, 1.0);
+    cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
     cv::dilate(fine.known < least_known, unknown, cv::Mat::ones(5, 1, CV_8U));
     slope.setTo(0, unknown);
+    return slope;
+}
+
+/// A border in the frame from its rows in the straightened picture; it ends at the picture's edge and where nothing
+/// counts any more.
+BorderLine in_frame(const std::vector<double>& row, const cv::Mat& valid, const RingCoordinate& rings) {
+    const int columns = static_cast<int>(row.size());
+    BorderLine line{.first = columns, .v = {}, .support = 0};
+    std::vector<double> place(columns);
+    int last = -1;
+    for (int u = 0; u < columns; ++u) {
+        place[u] = rings.v(u, rings.lowest() + row[u]);
+        const int v = static_cast<int>(std::lround(place[u]));
+        if (v < 0 || v >= valid.rows || valid.at<float>(v, u) == 0)
+            continue;
+        line.first = std::min(line.first, u);
+        last = u;
+    }
+    for (int u = line.first; u <= last; ++u)
+        line.v.push_back(std::clamp(place[u], 0.0, valid.rows - 1.0));
+    return line;
+}
+
+std::vector<BorderLine> lay_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                    const std::vector<Track>& tracks, std::size_t profiles) {
+    const cv::Mat slope = slope_across(gray, valid, rings);
     std::vector<BorderLine> borders;
-    for (const Track& track : kept) {
-        std::vector<double> guess(columns);
-        for (int u = 0; u < columns; ++u)
-            guess[u] = track.row_at((u + 0.5) * count / columns - 0.5);
+    for (const Track& track : tracks) {
+        std::vector<double> guess(gray.cols);
+        for (int u = 0; u < gray.cols; ++u)
+            guess[u] = track.row_at((u + 0.5) * static_cast<double>(profiles) / gray.cols - 0.5);
         const int reach = static_cast<int>(std::clamp(0.15 * track.room, 2.0, 15.0));
-        const std::vector<double> row = lay(slope, guess, reach);
-        // It ends at the picture's edge and where nothing counts any more.
-        int first = columns, last = -1;
-        for (int u = 0; u < columns; ++u) {
-            const double v = rings.v(u, rings.lowest() + row[u]);
-            const int at = std::clamp(static_cast<int>(std::lround(row[u])), 0, straight.known.rows - 1);
-            if (v >= 0 && v <= gray.rows - 1 && straight.known.at<float>(at, u) >= least_known) {
-                first = std::min(first, u);
-                last = u;
-            }
-        }
-        BorderLine line{.first = first, .v = {}, .support = track.support};
-        for (int u = first; u <= last; ++u)
-            line.v.push_back(std::clamp(rings.v(u, rings.lowest() + row[u]), 0.0, gray.rows - 1.0));
+        BorderLine line = in_frame(lay(slope, guess, reach), valid, rings);
+        line.support = track.support;
         if (line.v.size() > 1)
             borders.push_back(std::move(line));
     }
     return borders;
+}
+
+}  // namespace
+
+StraightPicture straighten(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double along) {
+    StraightPicture straight;
+    straight.known = blur_along(rings.straighten(valid), along);
+    straight.gray = blur_along(rings.straighten(gray.mul(valid)), along) / cv::max(straight.known, 1e-6);
+    return straight;
+}
+
+std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                          double ring_width) {
+    const std::vector<Profile> profiles = take_profiles(gray, valid, rings, ring_width);
+    const std::vector<Track> tracks = keep(follow(profiles, ring_width), profiles);
+    return lay_borders(gray, valid, rings, tracks, profiles.size());
 }
 
 double typical_ring_width(const std::vector<BorderLine>& borders) {

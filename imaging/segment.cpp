@@ -18,6 +18,7 @@
 namespace crampfit {
 namespace {
 
+constexpr double least_coherency = 0.25;     // of the picture; noise has some 0.1
 constexpr int least_side = 16;               // pixels
 constexpr std::size_t most_pixels = 1 << 26; // some forty bytes are needed for each
 
@@ -56,13 +57,29 @@ struct Round {
     cv::Mat degree;    // in the frame
     cv::Mat features;  // in the frame
     double ring_width = 0;
+    std::string obstacle;  // to tracing rings; empty: none
 };
 
+double shorter_side(cv::Size picture) { return std::min(picture.width, picture.height); }
+
+/// Before anything is known.
+OrientationScale first_scale(cv::Size picture) { return {2, std::clamp(shorter_side(picture) / 10, 6.0, 60.0)}; }
+
+/// Derivatives well within a ring, gathered over half a ring to either side, or more where rings are fine: noise. Without
+/// a ring width the middle between fine and coarse.
 OrientationScale scale_for(double ring_width, cv::Size picture) {
     if (!(ring_width > 0))
-        return {2, std::clamp(std::min(picture.width, picture.height) / 10.0, 6.0, 60.0)};
-    // Derivatives well within a ring, gathered over half a ring to either side.
-    return {std::clamp(0.05 * ring_width, 1.0, 4.0), std::max(4.0, 0.5 * ring_width)};
+        return {2, std::clamp(shorter_side(picture) / 25, 6.0, 60.0)};
+    return {std::clamp(0.05 * ring_width, 1.0, 4.0), std::max({4.0, 0.5 * ring_width, shorter_side(picture) / 40})};
+}
+
+/// Why no rings can be traced; empty where they can.
+std::string obstacle(const OrientationField& field) {
+    if (cv::mean(field.coherency)[0] < least_coherency)
+        return "no rings: gray varies in all directions alike";
+    if (holds_pith(field))
+        return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
+    return "";
 }
 
 std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, const GrowthFrame& frame) {
@@ -77,24 +94,30 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
     return lines;
 }
 
-Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const GrowthFrame& frame, double ring_width,
-           const std::vector<BorderPolyline>& given) {
+Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const GrowthFrame& frame,
+           const OrientationScale& scale, double ring_width, const std::vector<BorderPolyline>& given) {
     Round round;
     cv::Mat counts;
     frame.turn_back(valid).convertTo(counts, CV_8U, 255);
-    round.orientation = measure_orientation(frame.turn_back(gray), counts, scale_for(ring_width, counts.size()));
+    round.orientation = measure_orientation(frame.turn_back(gray), counts, scale);
     const RingCoordinate rings(round.orientation, frame);
-    round.borders = given.empty() ? find_ring_borders(gray, valid, rings, ring_width) : lines_of(given, frame);
+    round.obstacle = obstacle(round.orientation);
+    if (!given.empty())
+        round.borders = lines_of(given, frame);
+    else if (round.obstacle.empty())
+        round.borders = find_ring_borders(gray, valid, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;
     round.degree = density_degree(gray, valid, rings, round.borders, width, levels);
-    round.features = find_foreign(gray, bgr, levels, width);
+    // Without rings it is not known how dark LW is.
+    round.features = round.borders.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)))
+                                           : find_foreign(gray, bgr, levels, width);
     return round;
 }
 
 GrowthAxis growth_of(const cv::Mat& gray, const SegmentOptions& options, std::vector<std::string>& notes) {
-    const GrowthGuess guess = guess_growth(gray, measure_orientation(gray, {}, scale_for(0, gray.size())));
+    const GrowthGuess guess = guess_growth(gray, measure_orientation(gray, {}, first_scale(gray.size())));
     if (!options.growth) {
         notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
         return guess.growth;
@@ -167,9 +190,11 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
 
     const GrowthFrame frame(growth_of(pixels.gray, options, result.notes), pixels.gray.size());
     const cv::Mat gray = frame.turn(pixels.gray), bgr = pixels.bgr.empty() ? cv::Mat() : frame.turn(pixels.bgr);
-    const Round first = look(gray, bgr, cv::Mat::ones(gray.size(), CV_32F), frame, 0, options.borders);
+    const Round first =
+        look(gray, bgr, cv::Mat::ones(gray.size(), CV_32F), frame, first_scale(gray.size()), 0, options.borders);
     const cv::Mat valid = countable(first.features);
-    const Round second = look(flatten(gray, valid), bgr, valid, frame, first.ring_width, options.borders);
+    const Round second = look(flatten(gray, valid), bgr, valid, frame, scale_for(first.ring_width, gray.size()),
+                              first.ring_width, options.borders);
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
     const cv::Mat classes = classify(second.degree, options.classes, width);
@@ -177,6 +202,8 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     for (std::size_t i = 0; i < second.borders.size(); ++i)
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
     specimen.rings = ring_figures(second.borders, classes, options.classes - 1, second.features);
+    if (!second.obstacle.empty() && options.borders.empty())
+        result.notes.push_back(second.obstacle);
     result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
                                        specimen.borders.size(), options.borders.empty() ? "" : " as given",
                                        specimen.rings.size(), second.ring_width));

@@ -13,8 +13,8 @@ namespace crampfit {
 struct SegmentOptions {
     double pixel = 0;              // edge of a pixel [m]; 0: from the file's resolution tag, where there is one
     int classes = 2;               // 2: EW, LW; 3: EW, transition, LW
-    std::optional<GrowthAxis> growth;  // from pith to bark; none: told from the picture
-    std::vector<BorderPolyline> borders;  // corrected by hand; empty: found
+    std::optional<GrowthAxis> growth = std::nullopt;  // from pith to bark; none: told from the picture
+    std::vector<BorderPolyline> borders = {};  // corrected by hand; empty: found
 
     /// Throws InputError for anything out of range.
     void validate() const;
