@@ -9,6 +9,8 @@ namespace crampfit {
 namespace {
 
 constexpr double too_dark = 0.25;  // below LW, of the contrast
+constexpr double dark_line = 0.5;   // a crack below its ring, of the contrast
+constexpr double light_line = 0.33; // a ray above its ring, of the contrast
 constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than white light
 constexpr double too_green = 0.04; // green above red and blue
 
@@ -75,22 +77,28 @@ cv::Mat find_background(const cv::Mat& strange, double width) {
 
 }  // namespace
 
-cv::Mat find_foreign(const cv::Mat& gray, const cv::Mat& bgr, const WoodLevels& levels, double ring_width) {
-    cv::Mat features(gray.size(), CV_8U, cv::Scalar(number(Feature::wood)));
-    const double dark = levels.latewood - too_dark * levels.contrast();
+cv::Mat find_foreign(const WoodView& view) {
+    const auto& [gray, bgr, around, levels, width] = view;
+    const double contrast = levels.contrast(), dark = levels.latewood - too_dark * contrast;
     const cv::Mat hue = strange_hue(bgr, gray.size());
     cv::Mat smooth;
-    cv::GaussianBlur(gray, smooth, {}, std::max(1.0, 0.06 * ring_width));
-    const cv::Mat background = find_background((smooth < dark) | hue, ring_width);
+    cv::GaussianBlur(gray, smooth, {}, std::max(1.0, 0.06 * width));
+    const cv::Mat background = find_background((smooth < dark) | hue, width);
 
     cv::GaussianBlur(gray, smooth, {}, 0.7);
-    const cv::Mat rest = ((smooth < dark) | hue) & (background == 0);
-    const auto is_crack = [&](const int* box) {
-        const double length = box[cv::CC_STAT_HEIGHT], thickness = box[cv::CC_STAT_AREA] / length;
-        return length > std::max(8.0, 0.4 * ring_width) && thickness < 0.2 * length && thickness < 0.2 * ring_width;
+    cv::Mat inked;
+    cv::dilate(hue | background, inked, disk(3));
+    const auto lines = [&](const cv::Mat& mask, double least) {
+        return pick(mask & (inked == 0), [&](const int* box) {
+            const double length = box[cv::CC_STAT_HEIGHT], thickness = box[cv::CC_STAT_AREA] / length;
+            return length > std::max(8.0, least * width) && thickness < 0.25 * length && thickness < 0.2 * width;
+        });
     };
-    features.setTo(number(Feature::mark), pick(rest, [&](const int* box) { return box[cv::CC_STAT_AREA] >= 4; }));
-    features.setTo(number(Feature::crack), pick(rest & (hue == 0), is_crack));
+    cv::Mat features(gray.size(), CV_8U, cv::Scalar(number(Feature::wood)));
+    const cv::Mat patches = ((smooth < dark) | hue) & (background == 0);
+    features.setTo(number(Feature::mark), pick(patches, [](const int* box) { return box[cv::CC_STAT_AREA] >= 4; }));
+    features.setTo(number(Feature::ray), lines(smooth > around + light_line * contrast, 0.15));
+    features.setTo(number(Feature::crack), lines(smooth < around - dark_line * contrast, 0.4));
     features.setTo(number(Feature::background), background);
     return features;
 }

@@ -110,9 +110,12 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const 
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;
     round.degree = density_degree(gray, valid, rings, round.borders, width, levels);
-    // Without rings it is not known how dark LW is.
-    round.features = round.borders.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)))
-                                           : find_foreign(gray, bgr, levels, width);
+    if (round.borders.empty()) {  // then it is not known how dark LW is
+        round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
+        return round;
+    }
+    const cv::Mat around = rings.bend(straighten(gray, valid, rings, std::max(8.0, 0.5 * width)).gray);
+    round.features = find_foreign({gray, bgr, around, levels, width});
     return round;
 }
 

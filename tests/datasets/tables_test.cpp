@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include <limits>
+#include <numbers>
 #include <sstream>
 
 using namespace crampfit;
