@@ -211,7 +211,8 @@ Table orientation_table(const Specimen& specimen) {
             const std::size_t at = static_cast<std::size_t>(y) * specimen.columns + x;
             const double degrees = specimen.orientation[at] * 180 / std::numbers::pi;
             const double coherency = specimen.coherency.empty() ? 1 : specimen.coherency[at];
-            table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees), fmt::format("{:.4f}", coherency)});
+            table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees),
+                             fmt::format("{:.4f}", coherency)});
         }
     }
     return table;

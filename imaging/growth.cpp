@@ -82,7 +82,8 @@ GrowthGuess guess_growth(const cv::Mat& gray, const OrientationField& field) {
         return {skewness > 0 ? with : against, fmt::format("LW's sharper side (skewness {:.2f})", std::abs(skewness))};
     const double turned = spread(field, frame);
     if (std::abs(turned) > plain_spread)
-        return {turned > 0 ? with : against, fmt::format("the rings' curvature ({:.2f} rad across the picture)", std::abs(turned))};
+        return {turned > 0 ? with : against,
+                fmt::format("the rings' curvature ({:.2f} rad across the picture)", std::abs(turned))};
     return {with, "assumption, for neither LW's sharper side nor curvature shows it: give --growth"};
 }
 

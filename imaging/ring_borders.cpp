@@ -224,7 +224,8 @@ std::vector<Track> keep(std::vector<Track> tracks, const std::vector<Profile>& p
             chosen.push_back(track);
     }
     std::sort(chosen.begin(), chosen.end(), [](const Track& a, const Track& b) {
-        const double middle = 0.5 * (std::max(a.profile.front(), b.profile.front()) + std::min(a.profile.back(), b.profile.back()));
+        const double middle = 0.5 * (std::max(a.profile.front(), b.profile.front()) +
+                                     std::min(a.profile.back(), b.profile.back()));
         return a.row_at(middle) < b.row_at(middle);
     });
     return chosen;
@@ -393,9 +394,10 @@ std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& va
 double typical_ring_width(const std::vector<BorderLine>& borders) {
     std::vector<float> widths;
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        const int middle = (std::max(borders[i - 1].first, borders[i].first) + std::min(borders[i - 1].end(), borders[i].end())) / 2;
-        if (borders[i - 1].covers(middle) && borders[i].covers(middle))
-            widths.push_back(static_cast<float>(borders[i].at(middle) - borders[i - 1].at(middle)));
+        const BorderLine &inner = borders[i - 1], &outer = borders[i];
+        const int middle = (std::max(inner.first, outer.first) + std::min(inner.end(), outer.end())) / 2;
+        if (inner.covers(middle) && outer.covers(middle))
+            widths.push_back(static_cast<float>(outer.at(middle) - inner.at(middle)));
     }
     return quantile(widths, 0.5);
 }
