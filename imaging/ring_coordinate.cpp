@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace crampfit {
 namespace {
@@ -141,9 +142,16 @@ double RingCoordinate::v(double u, double psi) const {
 cv::Mat RingCoordinate::straighten(const cv::Mat& in_frame) const {
     CV_Assert(in_frame.type() == CV_32F && in_frame.size() == frame_);
     cv::Mat straight = cv::Mat::zeros(straight_rows(), in_frame.cols, CV_32F);
+    std::vector<double> knots(values_.rows);  // of a column
     for (int u = 0; u < in_frame.cols; ++u) {
+        for (int j = 0; j < values_.rows; ++j)
+            knots[j] = knot(u, j);
+        int low = 0;
         for (int row = 0; row < straight.rows; ++row) {
-            const double place = v(u, lowest_ + row);
+            const double psi = lowest_ + row;
+            while (low + 2 < values_.rows && knots[low + 1] <= psi)
+                ++low;
+            const double place = spacing_v_ * (low + (psi - knots[low]) / (knots[low + 1] - knots[low]));
             if (place < 0 || place > in_frame.rows - 1)
                 continue;
             const int j = std::min(static_cast<int>(place), in_frame.rows - 2);

@@ -197,6 +197,8 @@ TEST(UnitHdf5, LargeMapsAreCompressed) {
     specimen.label.assign(4000000, 1);
     specimen.grade.clear();
     specimen.density.clear();
+    specimen.coherency.clear();
+    specimen.feature.clear();
     write(specimen, folder / "specimen.h5");
     // Four million equal bytes; deflate reaches a thousandth.
     EXPECT_LT(std::filesystem::file_size(folder / "specimen.h5"), 100000u);
