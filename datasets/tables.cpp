@@ -6,7 +6,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <functional>
+#include <limits>
+#include <numbers>
 #include <ostream>
 
 namespace crampfit {
@@ -178,6 +181,49 @@ std::vector<Offer> offers(const Fit& fit) {
             {"correlation", [&] { return correlation_table(fit); }}};
 }
 
+// ---- tables of a specimen
+
+Table borders_table(const Specimen& specimen) {
+    Table table{{"ring", "x_px", "y_px"}};
+    for (const BorderPolyline& border : specimen.borders)
+        for (const Eigen::Vector2d& point : border.points)
+            table.push_back({std::to_string(border.ring), fmt::format("{:.2f}", point.x()), fmt::format("{:.2f}", point.y())});
+    return table;
+}
+
+/// Without a scale a width in mm is not a number.
+Table rings_table(const Specimen& specimen) {
+    Table table{{"ring", "width_mm", "latewood_fraction"}};
+    const double millimetres = specimen.pixel > 0 ? 1e3 * specimen.pixel : std::numeric_limits<double>::quiet_NaN();
+    for (const RingFigures& ring : specimen.rings)
+        table.push_back({std::to_string(ring.ring), text_of(ring.width * millimetres), text_of(ring.latewood_fraction)});
+    return table;
+}
+
+/// At some hundred places along the longer side.
+Table orientation_table(const Specimen& specimen) {
+    Table table{{"x_px", "y_px", "radial_deg", "coherency"}};
+    if (specimen.orientation.empty())
+        return table;
+    const int step = std::max(1, std::max(specimen.columns, specimen.rows) / 100);
+    for (int y = step / 2; y < specimen.rows; y += step) {
+        for (int x = step / 2; x < specimen.columns; x += step) {
+            const std::size_t at = static_cast<std::size_t>(y) * specimen.columns + x;
+            const double degrees = specimen.orientation[at] * 180 / std::numbers::pi;
+            const double coherency = specimen.coherency.empty() ? 1 : specimen.coherency[at];
+            table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees),
+                             fmt::format("{:.4f}", coherency)});
+        }
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const Specimen& specimen) {
+    return {{"borders", [&] { return borders_table(specimen); }},
+            {"rings", [&] { return rings_table(specimen); }},
+            {"orientation", [&] { return orientation_table(specimen); }}};
+}
+
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
                   std::ostream& out) {
     std::vector<std::string> names;
@@ -201,6 +247,9 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     } else if (kind == "fit") {
         const Fit fit = read_fit(file);
         print_one_of(offers(fit), file, table, out);
+    } else if (kind == "specimen") {
+        const Specimen specimen = read_specimen(file);
+        print_one_of(offers(specimen), file, table, out);
     } else {
         print_one_of({}, file, table, out);
     }

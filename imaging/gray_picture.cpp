@@ -1,6 +1,7 @@
 #include "imaging/gray_picture.hpp"
 
 #include "datasets/error.hpp"
+#include "imaging/pixels.hpp"
 
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -115,7 +116,7 @@ cv::Mat to_gray(const cv::Mat& picture) {
 
 }  // namespace
 
-GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+cv::Mat read_pixels(const std::filesystem::path& file, const PictureKey& asked_by) {
     const auto fail = [&](const std::string& rule) {
         throw InputError(asked_by.file, asked_by.key, file.string(), rule);
     };
@@ -123,20 +124,24 @@ GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked
     if (is_cut_short(bytes)) {
         fail("the picture is cut short");
     }
-    cv::Mat gray;
     try {
         const QuietBoundedDecoding decoding;
-        const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+        cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
         if (picture.empty()) {
             fail("is no picture in a known format, or is damaged or cut short");
         }
         if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
             fail("must be a picture of 8 or 16 bits a channel");
         }
-        gray = to_gray(picture);
+        return picture;
     } catch (const cv::Exception&) {
         fail("is damaged, or its header asks for more than 2^28 pixels");
     }
+    return {};
+}
+
+GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+    const cv::Mat gray = to_gray(read_pixels(file, asked_by));
     return {gray.cols, gray.rows, {gray.begin<std::uint8_t>(), gray.end<std::uint8_t>()}};
 }
 

@@ -143,6 +143,24 @@ Specimen read_picture(const Picture& picture, const std::string& asking_file) {
     return specimen;
 }
 
+/// Transition wood without a material of its own is half way from EW to LW in density.
+void grade_transition(const Scene& scene, Specimen& specimen) {
+    const std::vector<std::string> three{"EW", "transition", "LW"};
+    if (specimen.classes != three || scene.materials.contains("transition")) {
+        return;
+    }
+    specimen.classes = {"EW", "LW"};
+    specimen.grade.assign(specimen.label.size(), 0.0f);
+    for (std::size_t i = 0; i < specimen.label.size(); ++i) {
+        if (specimen.label[i] == 1) {
+            specimen.label[i] = 0;
+            specimen.grade[i] = 0.5f;
+        } else if (specimen.label[i] == 2) {
+            specimen.label[i] = 1;
+        }
+    }
+}
+
 void require_materials(const Scene& scene, const Specimen& specimen, const std::string& key) {
     for (const std::string& name : specimen.classes) {
         if (!scene.materials.contains(name)) {
@@ -163,6 +181,11 @@ void load_specimen(Scene& scene) {
         plan.map = std::make_shared<const Specimen>(std::move(specimen));
     } else if (!plan.file.empty()) {
         Specimen specimen = read_specimen(plan.file);
+        if (!(specimen.pixel > 0)) {
+            throw InputError(scene.file.string(), "specimen.file", plan.file.string(),
+                             "has no scale: segment its picture again with --pixel");
+        }
+        grade_transition(scene, specimen);
         require_materials(scene, specimen, "specimen.file");
         plan.map = std::make_shared<const Specimen>(std::move(specimen));
     }

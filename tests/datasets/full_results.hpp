@@ -121,6 +121,11 @@ inline Specimen full_specimen() {
     specimen.grade[1] = 1.0f / 3.0f;
     specimen.density.assign(21, 312.5f);
     specimen.density[3] = std::numeric_limits<float>::quiet_NaN();
+    specimen.coherency.assign(21, 0.5f);
+    specimen.feature.assign(21, 0);
+    specimen.feature[20] = static_cast<std::uint8_t>(Feature::background);
+    specimen.borders = {{1, {{0.25, 1}, {6, 1.5}}}, {2, {{0, 2}, {3, 2.125}, {6, 2}}}};
+    specimen.rings = {{2, 1.0 / 3.0, 0.25}};
     specimen.source = "block.png";
     return specimen;
 }

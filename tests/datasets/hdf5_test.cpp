@@ -140,6 +140,17 @@ TEST(UnitHdf5, SpecimenComesBackBitForBit) {
     EXPECT_TRUE(same_bits(after.grade, before.grade));
     EXPECT_TRUE(same_bits(after.density, before.density));
     EXPECT_TRUE(after.orientation.empty());
+    EXPECT_TRUE(same_bits(after.coherency, before.coherency));
+    EXPECT_EQ(after.feature, before.feature);
+    ASSERT_EQ(after.borders.size(), before.borders.size());
+    for (std::size_t i = 0; i < before.borders.size(); ++i) {
+        EXPECT_EQ(after.borders[i].ring, before.borders[i].ring);
+        EXPECT_EQ(after.borders[i].points, before.borders[i].points);
+    }
+    ASSERT_EQ(after.rings.size(), 1u);
+    EXPECT_EQ(after.rings[0].ring, 2);
+    EXPECT_EQ(after.rings[0].width, 1.0 / 3.0);
+    EXPECT_EQ(after.rings[0].latewood_fraction, 0.25);
     EXPECT_EQ(after.source, before.source);
 }
 
@@ -186,6 +197,8 @@ TEST(UnitHdf5, LargeMapsAreCompressed) {
     specimen.label.assign(4000000, 1);
     specimen.grade.clear();
     specimen.density.clear();
+    specimen.coherency.clear();
+    specimen.feature.clear();
     write(specimen, folder / "specimen.h5");
     // Four million equal bytes; deflate reaches a thousandth.
     EXPECT_LT(std::filesystem::file_size(folder / "specimen.h5"), 100000u);

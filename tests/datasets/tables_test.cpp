@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <numbers>
 #include <sstream>
 
 using namespace crampfit;
@@ -156,5 +157,27 @@ TEST(UnitTables, UnknownTableListsThoseThatThereAre) {
     Specimen specimen;
     specimen.pixel = 1e-5;
     write(specimen, folder / "specimen.h5");
-    EXPECT_EQ(refusal(folder / "specimen.h5", "series"), "this file has no tables");
+    EXPECT_EQ(refusal(folder / "specimen.h5", "series"), "must be one of: borders, rings, orientation");
+}
+
+TEST(UnitTables, TablesOfASpecimen) {
+    const TemporaryFolder folder;
+    Specimen specimen;
+    specimen.columns = 2;
+    specimen.rows = 1;
+    specimen.pixel = 1e-3;
+    specimen.classes = {"EW"};
+    specimen.label = {0, 0};
+    specimen.orientation = {0.0f, std::numbers::pi_v<float> / 2};
+    specimen.coherency = {1.0f, 0.5f};
+    specimen.borders = {{3, {{0, 0.5}, {1, 0.25}}}};
+    specimen.rings = {{3, 2.5, 0.125}};
+    write(specimen, folder / "specimen.h5");
+    EXPECT_EQ(table(folder / "specimen.h5", "borders"), "ring,x_px,y_px\n3,0.00,0.50\n3,1.00,0.25\n");
+    EXPECT_EQ(table(folder / "specimen.h5", "rings"), "ring,width_mm,latewood_fraction\n3,2.5,0.125\n");
+    EXPECT_EQ(table(folder / "specimen.h5", "orientation"),
+              "x_px,y_px,radial_deg,coherency\n0,0,0.000,1.0000\n1,0,90.000,0.5000\n");
+    specimen.pixel = 0;
+    write(specimen, folder / "specimen.h5");
+    EXPECT_EQ(table(folder / "specimen.h5", "rings"), "ring,width_mm,latewood_fraction\n3,nan,0.125\n");
 }

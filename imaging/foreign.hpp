@@ -1,0 +1,30 @@
+#pragma once
+
+#include "datasets/specimen.hpp"
+#include "imaging/wood_classes.hpp"
+
+#include <opencv2/core.hpp>
+
+namespace crampfit {
+
+/// What to tell other things from wood by, all in the growth frame.
+struct WoodView {
+    const cv::Mat& gray;    // float, 0..1
+    const cv::Mat& bgr;     // blue, green, red, float, 0..1; empty: the picture is gray
+    const cv::Mat& around;  // gray of the same ring on both sides, float
+    WoodLevels levels;
+    double ring_width;      // [pixels]
+};
+
+/// What in a picture is no plain wood, as a map of `Feature` numbers:
+/// - background: too dark for wood, or green or blue, and connected to the picture's edge; islands in it, too
+/// - crack: a thin line across the rings, darker than its ring around it by half the contrast of LW to EW
+/// - ray: the same, lighter by a third
+/// - mark: other patches that are too dark, or blue or green: ink, holes, dirt
+/// Too dark is darker than LW by a quarter of the contrast. Light background is not told from wood.
+cv::Mat find_foreign(const WoodView& view);
+
+/// 1 where a pixel is wood that counts (float): not foreign, and not right beside it.
+cv::Mat countable(const cv::Mat& features);
+
+}  // namespace crampfit

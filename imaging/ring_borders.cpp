@@ -1,0 +1,405 @@
+#include "imaging/ring_borders.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr double least_known = 0.3;       // share of a place's surroundings that must count
+constexpr double least_prominence = 0.35; // of a rise, against the contrast around it
+constexpr double least_contrast = 0.3;    // of a place, against the picture's
+constexpr double least_support = 0.5;     // share of profiles that must show a border
+constexpr double nearness = 0.3;          // of neighbours, up to which a rise continues a border
+
+double quantile(std::vector<float> values, double share) {
+    if (values.empty())
+        return 0;
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), nth, values.end());
+    return *nth;
+}
+
+cv::Mat blur_along(const cv::Mat& values, double sigma) {
+    cv::Mat out;
+    const int size = 2 * static_cast<int>(std::ceil(3 * sigma)) + 1;
+    cv::sepFilter2D(values, out, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
+                    {-1, -1}, 0, cv::BORDER_CONSTANT);
+    return out;
+}
+
+/// One column of the straightened picture.
+struct Profile {
+    int column = 0;
+    std::vector<float> gray;
+    std::vector<char> known;
+    double first = 0, last = 0;  // rows at which the picture begins and ends
+};
+
+/// A rise of gray in a profile.
+struct Rise {
+    double row = 0;     // where it is steepest
+    double height = 0;  // from the darkest before it to the brightest after it
+    double room = 0;    // to the nearest other rise
+};
+
+Profile take_profile(const StraightPicture& straight, const RingCoordinate& rings, int column, double sigma,
+                     int frame_rows) {
+    Profile profile;
+    profile.column = column;
+    profile.first = rings.psi(column, 0) - rings.lowest();
+    profile.last = rings.psi(column, frame_rows - 1) - rings.lowest();
+    cv::Mat gray, known;
+    const cv::Mat weight = straight.known.col(column).clone();
+    cv::GaussianBlur(straight.gray.col(column).mul(weight), gray, {1, 0}, sigma, sigma, cv::BORDER_CONSTANT);
+    cv::GaussianBlur(weight, known, {1, 0}, sigma, sigma, cv::BORDER_CONSTANT);
+    for (int row = 0; row < gray.rows; ++row) {
+        const float share = known.at<float>(row);
+        profile.known.push_back(weight.at<float>(row) >= least_known);
+        profile.gray.push_back(share > 0 ? gray.at<float>(row) / share : 0);
+    }
+    return profile;
+}
+
+/// Difference of bright and dark within `reach` of each row, taken at every tenth of it.
+std::vector<double> contrast_around(const Profile& profile, int reach) {
+    const int rows = static_cast<int>(profile.gray.size()), step = std::max(1, reach / 10);
+    std::vector<double> contrast(rows, 0);
+    for (int from = 0; from < rows; from += step) {
+        std::vector<float> known;
+        for (int row = std::max(0, from - reach); row < std::min(rows, from + reach + 1); ++row)
+            if (profile.known[row])
+                known.push_back(profile.gray[row]);
+        const double here = quantile(known, 0.95) - quantile(known, 0.05);
+        std::fill(contrast.begin() + from, contrast.begin() + std::min(rows, from + step), here);
+    }
+    return contrast;
+}
+
+std::optional<Rise> steepest_between(const Profile& profile, int from, int to) {
+    const auto slope = [&](int row) {
+        const bool known = profile.known[row - 1] && profile.known[row] && profile.known[row + 1];
+        return known ? profile.gray[row + 1] - profile.gray[row - 1] : 0.0f;
+    };
+    int best = 0;
+    for (int row = std::max(from, 2); row <= std::min<int>(to, static_cast<int>(profile.gray.size()) - 3); ++row)
+        if (slope(row) > (best ? slope(best) : 0.0f))
+            best = row;
+    if (!best)
+        return std::nullopt;
+    return Rise{static_cast<double>(best), static_cast<double>(profile.gray[to]) - profile.gray[from], 0};
+}
+
+/// Follows the profile from turning point to turning point; a turn counts when gray goes back by `least(row)`.
+template <class Least> std::vector<Rise> find_rises(const Profile& profile, const Least& least) {
+    std::vector<Rise> rises;
+    int low = -1, high = -1;  // extremes since the last turn
+    bool rising = false;
+    const auto end_rise = [&](int from, int to) {
+        if (const auto rise = steepest_between(profile, from, to))
+            rises.push_back(*rise);
+    };
+    for (int row = 0; row < static_cast<int>(profile.gray.size()); ++row) {
+        if (!profile.known[row])
+            continue;
+        const float gray = profile.gray[row];
+        if (low < 0)
+            low = high = row;
+        if (rising) {
+            if (gray > profile.gray[high])
+                high = row;
+            if (gray < profile.gray[high] - least(row)) {
+                end_rise(low, high);
+                rising = false;
+                low = row;
+            }
+        } else {
+            if (gray < profile.gray[low])
+                low = row;
+            if (gray > profile.gray[low] + least(row)) {
+                rising = true;
+                high = row;
+            }
+        }
+    }
+    if (rising)
+        end_rise(low, high);
+    for (std::size_t i = 0; i < rises.size(); ++i) {
+        const auto rows = static_cast<double>(profile.gray.size());
+        const double before = i > 0 ? rises[i].row - rises[i - 1].row : rows;
+        const double after = i + 1 < rises.size() ? rises[i + 1].row - rises[i].row : rows;
+        rises[i].room = std::min(before, after);
+    }
+    return rises;
+}
+
+/// A border on its way through the profiles.
+struct Track {
+    std::vector<int> profile;
+    std::vector<double> row;
+    double room = 0;  // of its last rise
+    double support = 0;
+
+    double last_row() const {
+        const std::size_t count = std::min<std::size_t>(3, row.size());
+        return std::accumulate(row.end() - static_cast<std::ptrdiff_t>(count), row.end(), 0.0) /
+               static_cast<double>(count);
+    }
+    /// Straight between what was seen, level beyond.
+    double row_at(double place) const {
+        const auto after = std::lower_bound(profile.begin(), profile.end(), place);
+        if (after == profile.begin())
+            return row.front();
+        if (after == profile.end())
+            return row.back();
+        const std::size_t i = static_cast<std::size_t>(after - profile.begin());
+        const double share = (place - profile[i - 1]) / (profile[i] - profile[i - 1]);
+        return row[i - 1] + share * (row[i] - row[i - 1]);
+    }
+};
+
+/// Each rise continues the track that is nearest, where each is the other's nearest; or begins one.
+void join(std::vector<Track>& tracks, const std::vector<Rise>& rises, int profile) {
+    const auto distance = [](const Track& track, const Rise& rise) { return std::abs(track.last_row() - rise.row); };
+    const std::size_t open = tracks.size();
+    std::vector<std::size_t> nearest_rise(open);
+    for (std::size_t t = 0; t < open; ++t)
+        for (std::size_t r = 0; r < rises.size(); ++r)
+            if (distance(tracks[t], rises[r]) < distance(tracks[t], rises[nearest_rise[t]]))
+                nearest_rise[t] = r;
+    for (std::size_t r = 0; r < rises.size(); ++r) {
+        std::size_t best = open;
+        for (std::size_t t = 0; t < open; ++t) {
+            const double limit = std::max(2.5, nearness * std::min(tracks[t].room, rises[r].room));
+            if (nearest_rise[t] == r && distance(tracks[t], rises[r]) <= limit &&
+                (best == open || tracks[t].profile.size() > tracks[best].profile.size()))
+                best = t;
+        }
+        Track& track = best < open ? tracks[best] : tracks.emplace_back();
+        track.profile.push_back(profile);
+        track.row.push_back(rises[r].row);
+        track.room = rises[r].room;
+    }
+}
+
+/// Share of the profiles that show the track, among those that its level meets within the picture: what shows in less
+/// than half of them is a chip or chance.
+double support_of(const Track& track, const std::vector<Profile>& profiles) {
+    int within = 0;
+    for (std::size_t k = 0; k < profiles.size(); ++k) {
+        const double row = track.row_at(static_cast<double>(k));
+        within += row >= profiles[k].first && row <= profiles[k].last;
+    }
+    return static_cast<double>(track.profile.size()) / std::max(within, 1);
+}
+
+double mean_distance(const Track& a, const Track& b) {
+    const int first = std::min(a.profile.front(), b.profile.front()), last = std::max(a.profile.back(), b.profile.back());
+    double sum = 0;
+    for (int k = first; k <= last; ++k)
+        sum += std::abs(a.row_at(k) - b.row_at(k));
+    return sum / (last - first + 1);
+}
+
+/// Tracks that hold, from the pith outward; of two that run together only the better one.
+std::vector<Track> keep(std::vector<Track> tracks, const std::vector<Profile>& profiles) {
+    std::vector<Track> kept;
+    const std::size_t least = std::min<std::size_t>(3, profiles.size());
+    for (Track& track : tracks) {
+        track.support = support_of(track, profiles);
+        if (track.profile.size() >= least && track.support >= least_support)
+            kept.push_back(track);
+    }
+    std::sort(kept.begin(), kept.end(), [](const Track& a, const Track& b) { return a.profile.size() > b.profile.size(); });
+    std::vector<Track> chosen;
+    for (const Track& track : kept) {
+        const bool doubled = std::any_of(chosen.begin(), chosen.end(), [&](const Track& other) {
+            return mean_distance(track, other) < nearness * std::min(track.room, other.room);
+        });
+        if (!doubled)
+            chosen.push_back(track);
+    }
+    std::sort(chosen.begin(), chosen.end(), [](const Track& a, const Track& b) {
+        const double middle = 0.5 * (std::max(a.profile.front(), b.profile.front()) +
+                                     std::min(a.profile.back(), b.profile.back()));
+        return a.row_at(middle) < b.row_at(middle);
+    });
+    return chosen;
+}
+
+/// The way through `gain` [band x columns] that gathers most, moving at most one row a column and paying for each.
+std::vector<int> best_way(const cv::Mat& gain) {
+    constexpr float price = 0.3f;
+    cv::Mat sum = gain.clone(), from = cv::Mat::zeros(gain.size(), CV_8S);
+    for (int u = 1; u < gain.cols; ++u) {
+        for (int j = 0; j < gain.rows; ++j) {
+            float best = sum.at<float>(j, u - 1);
+            for (const int move : {-1, 1}) {
+                if (j + move < 0 || j + move >= gain.rows || sum.at<float>(j + move, u - 1) - price <= best)
+                    continue;
+                best = sum.at<float>(j + move, u - 1) - price;
+                from.at<schar>(j, u) = static_cast<schar>(move);
+            }
+            sum.at<float>(j, u) += best;
+        }
+    }
+    int j = 0;
+    for (int i = 1; i < gain.rows; ++i)
+        if (sum.at<float>(i, gain.cols - 1) > sum.at<float>(j, gain.cols - 1))
+            j = i;
+    std::vector<int> way(gain.cols);
+    for (int u = gain.cols - 1; u >= 0; --u) {
+        way[u] = j;
+        j += from.at<schar>(j, u);
+    }
+    return way;
+}
+
+/// Rows of the steepest rise in each column, within `reach` of a first guess.
+std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, int reach) {
+    const int columns = static_cast<int>(guess.size());
+    cv::Mat gain(2 * reach + 1, columns, CV_32F, cv::Scalar(0));
+    const auto row_of = [&](int u, int j) { return static_cast<int>(std::lround(guess[u])) + j - reach; };
+    std::vector<float> peaks;
+    for (int u = 0; u < columns; ++u) {
+        for (int j = 0; j < gain.rows; ++j)
+            if (const int row = row_of(u, j); row >= 0 && row < slope.rows)
+                gain.at<float>(j, u) = std::max(0.0f, slope.at<float>(row, u));
+        double peak = 0;
+        cv::minMaxLoc(gain.col(u), nullptr, &peak);
+        peaks.push_back(static_cast<float>(peak));
+    }
+    gain /= std::max(quantile(peaks, 0.5), 1e-6);
+    cv::min(gain, 1.5, gain);
+    const std::vector<int> way = best_way(gain);
+    cv::Mat rows(1, columns, CV_32F);
+    for (int u = 0; u < columns; ++u) {
+        const int row = row_of(u, way[u]);
+        double shift = 0;
+        if (row > 0 && row + 1 < slope.rows) {
+            const double a = slope.at<float>(row - 1, u), b = slope.at<float>(row, u), c = slope.at<float>(row + 1, u);
+            if (b > a && b >= c && b > 0)
+                shift = 0.5 * (a - c) / (a - 2 * b + c);  // a parabola's top
+        }
+        rows.at<float>(u) = static_cast<float>(row + shift);
+    }
+    cv::GaussianBlur(rows, rows, {0, 1}, 1.5, 1.5, cv::BORDER_REPLICATE);
+    return {rows.begin<float>(), rows.end<float>()};
+}
+
+/// Profiles across the rings, each a blurred stretch of them apart.
+std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                   double ring_width) {
+    const double most = ring_width > 0 ? std::max(2.0, 0.4 * ring_width) : 20;
+    const double along = std::clamp(gray.cols / 60.0, 1.0, most);
+    const double across = ring_width > 0 ? std::clamp(0.04 * ring_width, 1.0, 4.0) : 1.5;
+    const StraightPicture straight = straighten(gray, valid, rings, along);
+    const int count = std::max(1, static_cast<int>(gray.cols / (2 * along)));
+    std::vector<Profile> profiles;
+    for (int k = 0; k < count; ++k)
+        profiles.push_back(
+            take_profile(straight, rings, static_cast<int>((k + 0.5) * gray.cols / count), across, gray.rows));
+    return profiles;
+}
+
+/// Every track there is through the profiles.
+std::vector<Track> follow(const std::vector<Profile>& profiles, double ring_width) {
+    std::vector<std::vector<double>> contrasts;
+    std::vector<float> all;
+    for (const Profile& profile : profiles) {
+        const int rows = static_cast<int>(profile.gray.size());
+        const int reach = ring_width > 0 ? std::max(5, static_cast<int>(2.5 * ring_width)) : rows;
+        contrasts.push_back(contrast_around(profile, reach));
+        for (int row = 0; row < rows; row += std::max(1, rows / 100))
+            if (profile.known[row])
+                all.push_back(static_cast<float>(contrasts.back()[row]));
+    }
+    const double floor = least_contrast * quantile(all, 0.5);
+    std::vector<Track> tracks;
+    for (std::size_t k = 0; k < profiles.size(); ++k) {
+        const auto least = [&](int row) { return least_prominence * std::max(contrasts[k][row], floor) + 1e-6; };
+        join(tracks, find_rises(profiles[k], least), static_cast<int>(k));
+    }
+    return tracks;
+}
+
+/// How gray rises down the columns of the finely straightened picture; 0 where that is not known.
+cv::Mat slope_across(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
+    const StraightPicture fine = straighten(gray, valid, rings, 2.0);
+    cv::Mat smooth, slope, unknown;
+    cv::GaussianBlur(fine.gray, smooth, {1, 0}, 1.0, 1.0);
+    cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
+    cv::dilate(fine.known < least_known, unknown, cv::Mat::ones(5, 1, CV_8U));
+    slope.setTo(0, unknown);
+    return slope;
+}
+
+/// A border in the frame from its rows in the straightened picture; it ends at the picture's edge and where nothing
+/// counts any more.
+BorderLine in_frame(const std::vector<double>& row, const cv::Mat& valid, const RingCoordinate& rings) {
+    const int columns = static_cast<int>(row.size());
+    BorderLine line{.first = columns, .v = {}, .support = 0};
+    std::vector<double> place(columns);
+    int last = -1;
+    for (int u = 0; u < columns; ++u) {
+        place[u] = rings.v(u, rings.lowest() + row[u]);
+        const int v = static_cast<int>(std::lround(place[u]));
+        if (v < 0 || v >= valid.rows || valid.at<float>(v, u) == 0)
+            continue;
+        line.first = std::min(line.first, u);
+        last = u;
+    }
+    for (int u = line.first; u <= last; ++u)
+        line.v.push_back(std::clamp(place[u], 0.0, valid.rows - 1.0));
+    return line;
+}
+
+std::vector<BorderLine> lay_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                    const std::vector<Track>& tracks, std::size_t profiles) {
+    const cv::Mat slope = slope_across(gray, valid, rings);
+    std::vector<BorderLine> borders;
+    for (const Track& track : tracks) {
+        std::vector<double> guess(gray.cols);
+        for (int u = 0; u < gray.cols; ++u)
+            guess[u] = track.row_at((u + 0.5) * static_cast<double>(profiles) / gray.cols - 0.5);
+        const int reach = static_cast<int>(std::clamp(0.15 * track.room, 2.0, 15.0));
+        BorderLine line = in_frame(lay(slope, guess, reach), valid, rings);
+        line.support = track.support;
+        if (line.v.size() > 1)
+            borders.push_back(std::move(line));
+    }
+    return borders;
+}
+
+}  // namespace
+
+StraightPicture straighten(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double along) {
+    StraightPicture straight;
+    straight.known = blur_along(rings.straighten(valid), along);
+    straight.gray = blur_along(rings.straighten(gray.mul(valid)), along) / cv::max(straight.known, 1e-6);
+    return straight;
+}
+
+std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                                          double ring_width) {
+    const std::vector<Profile> profiles = take_profiles(gray, valid, rings, ring_width);
+    const std::vector<Track> tracks = keep(follow(profiles, ring_width), profiles);
+    return lay_borders(gray, valid, rings, tracks, profiles.size());
+}
+
+double typical_ring_width(const std::vector<BorderLine>& borders) {
+    std::vector<float> widths;
+    for (std::size_t i = 1; i < borders.size(); ++i) {
+        const BorderLine &inner = borders[i - 1], &outer = borders[i];
+        const int middle = (std::max(inner.first, outer.first) + std::min(inner.end(), outer.end())) / 2;
+        if (inner.covers(middle) && outer.covers(middle))
+            widths.push_back(static_cast<float>(outer.at(middle) - inner.at(middle)));
+    }
+    return quantile(widths, 0.5);
+}
+
+}  // namespace crampfit

@@ -1,0 +1,216 @@
+#include "imaging/segment.hpp"
+
+#include "datasets/error.hpp"
+#include "imaging/flatten.hpp"
+#include "imaging/foreign.hpp"
+#include "imaging/growth.hpp"
+#include "imaging/pixels.hpp"
+#include "imaging/resolution_tag.hpp"
+#include "imaging/ring_figures.hpp"
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace crampfit {
+namespace {
+
+constexpr double least_coherency = 0.25;     // of the picture; noise has some 0.1
+constexpr int least_side = 16;               // pixels
+constexpr std::size_t most_pixels = 1 << 26; // some forty bytes are needed for each
+
+/// Gray and colour as float, the brightest value 1.
+struct Pixels {
+    cv::Mat gray;
+    cv::Mat bgr;  // empty: the picture is gray
+};
+
+Pixels read_float(const std::filesystem::path& image) {
+    const PictureKey key{"command line", "IMAGE"};
+    const auto fail = [&](const std::string& rule) { throw InputError(key.file, key.key, image.string(), rule); };
+    const cv::Mat stored = read_pixels(image, key);
+    if (std::min(stored.rows, stored.cols) < least_side)
+        fail(fmt::format("is {} x {} pixels: at least {} a side are needed", stored.cols, stored.rows, least_side));
+    if (stored.total() > most_pixels)
+        fail(fmt::format("is {} x {} pixels: at most 2^26 can be segmented", stored.cols, stored.rows));
+    Pixels pixels;
+    cv::Mat gray = stored;
+    if (stored.channels() == 3)
+        cv::cvtColor(stored, gray, cv::COLOR_BGR2GRAY);
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(gray, &darkest, &brightest);
+    if (!(brightest > darkest))
+        fail(brightest > 0 ? "shows nothing: all pixels are equally bright" : "shows nothing: all pixels are black");
+    gray.convertTo(pixels.gray, CV_32F, 1 / brightest);
+    if (stored.channels() == 3)
+        stored.convertTo(pixels.bgr, CV_32FC3, 1 / brightest);
+    return pixels;
+}
+
+/// Everything found in one round.
+struct Round {
+    OrientationField orientation;
+    std::vector<BorderLine> borders;
+    cv::Mat degree;    // in the frame
+    cv::Mat features;  // in the frame
+    double ring_width = 0;
+    std::string obstacle;  // to tracing rings; empty: none
+};
+
+double shorter_side(cv::Size picture) { return std::min(picture.width, picture.height); }
+
+/// Before anything is known.
+OrientationScale first_scale(cv::Size picture) { return {2, std::clamp(shorter_side(picture) / 10, 6.0, 60.0)}; }
+
+/// Derivatives well within a ring, gathered over half a ring to either side, or more where rings are fine: noise. Without
+/// a ring width the middle between fine and coarse.
+OrientationScale scale_for(double ring_width, cv::Size picture) {
+    if (!(ring_width > 0))
+        return {2, std::clamp(shorter_side(picture) / 25, 6.0, 60.0)};
+    return {std::clamp(0.05 * ring_width, 1.0, 4.0), std::max({4.0, 0.5 * ring_width, shorter_side(picture) / 40})};
+}
+
+/// Why no rings can be traced; empty where they can.
+std::string obstacle(const OrientationField& field) {
+    if (cv::mean(field.coherency)[0] < least_coherency)
+        return "no rings: gray varies in all directions alike";
+    if (holds_pith(field))
+        return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
+    return "";
+}
+
+std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, const GrowthFrame& frame) {
+    std::vector<BorderLine> lines;
+    for (const BorderPolyline& border : borders)
+        lines.push_back(line_of(border, frame));
+    std::sort(lines.begin(), lines.end(), [](const BorderLine& a, const BorderLine& b) {
+        const int middle = (std::max(a.first, b.first) + std::min(a.end(), b.end())) / 2;
+        const auto at = [middle](const BorderLine& line) { return line.at(std::clamp(middle, line.first, line.end() - 1)); };
+        return at(a) < at(b);
+    });
+    return lines;
+}
+
+Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const GrowthFrame& frame,
+           const OrientationScale& scale, double ring_width, const std::vector<BorderPolyline>& given) {
+    Round round;
+    cv::Mat counts;
+    frame.turn_back(valid).convertTo(counts, CV_8U, 255);
+    round.orientation = measure_orientation(frame.turn_back(gray), counts, scale);
+    const RingCoordinate rings(round.orientation, frame);
+    round.obstacle = obstacle(round.orientation);
+    if (!given.empty())
+        round.borders = lines_of(given, frame);
+    else if (round.obstacle.empty())
+        round.borders = find_ring_borders(gray, valid, rings, ring_width);
+    round.ring_width = typical_ring_width(round.borders);
+    const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
+    WoodLevels levels;
+    round.degree = density_degree(gray, valid, rings, round.borders, width, levels);
+    if (round.borders.empty()) {  // then it is not known how dark LW is
+        round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
+        return round;
+    }
+    const cv::Mat around = rings.bend(straighten(gray, valid, rings, std::max(8.0, 0.5 * width)).gray);
+    round.features = find_foreign({gray, bgr, around, levels, width});
+    return round;
+}
+
+GrowthAxis growth_of(const cv::Mat& gray, const SegmentOptions& options, std::vector<std::string>& notes) {
+    const GrowthGuess guess = guess_growth(gray, measure_orientation(gray, {}, first_scale(gray.size())));
+    if (!options.growth) {
+        notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
+        return guess.growth;
+    }
+    if (*options.growth != guess.growth)
+        notes.push_back(fmt::format("growth {} as told, though the picture looks like {}, by {}", name(*options.growth),
+                                    name(guess.growth), guess.reason));
+    return *options.growth;
+}
+
+double pixel_of(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& notes) {
+    if (options.pixel > 0) {
+        notes.push_back(fmt::format("scale: {:.6g} um a pixel, from --pixel", 1e6 * options.pixel));
+        return options.pixel;
+    }
+    if (const double tagged = pixel_by_tag(image); tagged > 0) {
+        notes.push_back(fmt::format("scale: {:.6g} um a pixel ({:.6g} dpi), from the file's resolution tag; check it",
+                                    1e6 * tagged, 0.0254 / tagged));
+        return tagged;
+    }
+    notes.push_back("scale: not known (no --pixel, no resolution tag); widths in mm are nan and no scene can use the specimen");
+    return 0;
+}
+
+void fill_maps(Specimen& specimen, const Round& round, const cv::Mat& classes, const GrowthFrame& frame) {
+    const cv::Mat label = frame.turn_back(classes), feature = frame.turn_back(round.features);
+    specimen.label.assign(label.begin<std::uint8_t>(), label.end<std::uint8_t>());
+    specimen.feature.assign(feature.begin<std::uint8_t>(), feature.end<std::uint8_t>());
+    for (std::size_t i = 0; i < specimen.label.size(); ++i) {
+        const auto shown = static_cast<Feature>(specimen.feature[i]);
+        if (shown == Feature::background || shown == Feature::crack)
+            specimen.label[i] = Specimen::void_label;
+    }
+    const cv::Size size(specimen.columns, specimen.rows);
+    const OrientationField& field = round.orientation;
+    const cv::Mat c = field.full(field.cos2, size), s = field.full(field.sin2, size);
+    const cv::Mat coherency = field.full(field.coherency, size);
+    specimen.coherency.assign(coherency.begin<float>(), coherency.end<float>());
+    specimen.orientation.reserve(specimen.label.size());
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            // The picture's y runs down, the specimen's up.
+            const float angle = 0.5f * std::atan2(-s.at<float>(y, x), c.at<float>(y, x));
+            specimen.orientation.push_back(angle < 0 ? angle + std::numbers::pi_v<float> : angle);
+        }
+}
+
+}  // namespace
+
+void SegmentOptions::validate() const {
+    const auto require = [](bool holds, const char* key, const std::string& value, const char* rule) {
+        if (!holds)
+            throw InputError("command line", key, value, rule);
+    };
+    require(pixel >= 0 && std::isfinite(pixel), "--pixel", fmt::format("{} m", pixel), "must be a positive length");
+    require(classes == 2 || classes == 3, "--classes", std::to_string(classes), "must be 2 or 3");
+}
+
+Segmentation segment(const std::filesystem::path& image, const SegmentOptions& options) {
+    options.validate();
+    Segmentation result;
+    Pixels pixels = read_float(image);
+    Specimen& specimen = result.specimen;
+    specimen.columns = pixels.gray.cols;
+    specimen.rows = pixels.gray.rows;
+    specimen.source = image.string();
+    specimen.pixel = pixel_of(image, options, result.notes);
+    specimen.classes = options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"}
+                                            : std::vector<std::string>{"EW", "LW"};
+
+    const GrowthFrame frame(growth_of(pixels.gray, options, result.notes), pixels.gray.size());
+    const cv::Mat gray = frame.turn(pixels.gray), bgr = pixels.bgr.empty() ? cv::Mat() : frame.turn(pixels.bgr);
+    const Round first =
+        look(gray, bgr, cv::Mat::ones(gray.size(), CV_32F), frame, first_scale(gray.size()), 0, options.borders);
+    const cv::Mat valid = countable(first.features);
+    const Round second = look(flatten(gray, valid), bgr, valid, frame, scale_for(first.ring_width, gray.size()),
+                              first.ring_width, options.borders);
+
+    const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
+    const cv::Mat classes = classify(second.degree, options.classes, width);
+    fill_maps(specimen, second, classes, frame);
+    for (std::size_t i = 0; i < second.borders.size(); ++i)
+        specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
+    specimen.rings = ring_figures(second.borders, classes, options.classes - 1, second.features);
+    if (!second.obstacle.empty() && options.borders.empty())
+        result.notes.push_back(second.obstacle);
+    result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
+                                       specimen.borders.size(), options.borders.empty() ? "" : " as given",
+                                       specimen.rings.size(), second.ring_width));
+    return result;
+}
+
+}  // namespace crampfit

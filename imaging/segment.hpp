@@ -1,0 +1,33 @@
+#pragma once
+
+#include "datasets/specimen.hpp"
+#include "imaging/growth_axis.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+struct SegmentOptions {
+    double pixel = 0;              // edge of a pixel [m]; 0: from the file's resolution tag, where there is one
+    int classes = 2;               // 2: EW, LW; 3: EW, transition, LW
+    std::optional<GrowthAxis> growth = std::nullopt;  // from pith to bark; none: told from the picture
+    std::vector<BorderPolyline> borders = {};  // corrected by hand; empty: found
+
+    /// Throws InputError for anything out of range.
+    void validate() const;
+};
+
+struct Segmentation {
+    Specimen specimen;
+    std::vector<std::string> notes;  // what was assumed and found, a line each
+};
+
+/// Picture to specimen: classes, ring borders and figures, radial direction. Rings are found twice: the first round gives
+/// the ring width, which sets every scale of the second, and the levels of EW and LW, which tell what is no wood. Throws
+/// InputError for a picture that cannot be read, is smaller than 16 pixels, larger than 2^26, or shows no contrast.
+Segmentation segment(const std::filesystem::path& image, const SegmentOptions& options);
+
+}  // namespace crampfit

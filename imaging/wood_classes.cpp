@@ -1,0 +1,222 @@
+#include "imaging/wood_classes.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace crampfit {
+namespace {
+
+constexpr double dark_share = 0.03;    // of a ring, that is no brighter than pure LW
+constexpr double bright_share = 0.90;  // of a ring, that is no brighter than pure EW
+constexpr double mixed = 1.5;          // pixels on either side of a border that show some of the other side
+
+double quantile(std::vector<float>& values, double share) {
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), nth, values.end());
+    return *nth;
+}
+
+/// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
+cv::Mat smooth_wood(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double ring_width) {
+    cv::Mat smooth, missing;
+    for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
+        const StraightPicture straight = straighten(gray, valid, rings, along);
+        const cv::Mat here = rings.bend(straight.gray);
+        if (smooth.empty())
+            smooth = here;
+        else
+            here.copyTo(smooth, missing);
+        // A place whose neighbours along the ring hardly count is still to be filled.
+        missing = rings.bend(straight.known) < 0.3;
+        if (cv::countNonZero(missing) == 0)
+            break;
+    }
+    return smooth;
+}
+
+/// Levels of one ring at some columns, a stretch of ring apart.
+class RingLevels {
+  public:
+    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const BorderLine& inner, const BorderLine& outer, int stretch) {
+        const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
+        const int count = std::max(1, (to - from) / stretch);
+        for (int k = 0; k < count; ++k) {
+            const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
+            std::vector<float> values;
+            for (int u = begin; u < end; ++u)
+                for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
+                    if (valid.at<float>(v, u) > 0)
+                        values.push_back(gray.at<float>(v, u));
+            if (values.size() < 20)
+                continue;
+            columns_.push_back(0.5 * (begin + end - 1));
+            levels_.push_back({quantile(values, bright_share), quantile(values, dark_share)});
+        }
+    }
+
+    bool empty() const { return levels_.empty(); }
+    const std::vector<WoodLevels>& all() const { return levels_; }
+
+    WoodLevels at(int u) const {
+        const auto after = std::lower_bound(columns_.begin(), columns_.end(), u);
+        if (after == columns_.begin())
+            return levels_.front();
+        if (after == columns_.end())
+            return levels_.back();
+        const std::size_t i = static_cast<std::size_t>(after - columns_.begin());
+        const double a = (u - columns_[i - 1]) / (columns_[i] - columns_[i - 1]);
+        return {(1 - a) * levels_[i - 1].earlywood + a * levels_[i].earlywood,
+                (1 - a) * levels_[i - 1].latewood + a * levels_[i].latewood};
+    }
+
+    /// A stretch without its own LW or EW (a gap, a wedging ring) takes the picture's.
+    void mend(const WoodLevels& typical) {
+        for (WoodLevels& level : levels_)
+            if (level.contrast() < 0.3 * typical.contrast())
+                level = typical;
+    }
+
+  private:
+    std::vector<double> columns_;
+    std::vector<WoodLevels> levels_;
+};
+
+WoodLevels median_levels(const std::vector<RingLevels>& rings) {
+    std::vector<float> early, late;
+    for (const RingLevels& ring : rings)
+        for (const WoodLevels& level : ring.all()) {
+            early.push_back(static_cast<float>(level.earlywood));
+            late.push_back(static_cast<float>(level.latewood));
+        }
+    return {quantile(early, 0.5), quantile(late, 0.5)};
+}
+
+/// Otsu's thresholds: those that make the variance between the classes largest. Values count from `low` to `high`.
+std::vector<double> otsu(const cv::Mat& values, const cv::Mat& counts, int classes, double low, double high) {
+    constexpr int bins = 256;
+    std::array<double, bins + 1> mass{}, moment{};  // of all bins before
+    for (int v = 0; v < values.rows; ++v)
+        for (int u = 0; u < values.cols; ++u)
+            if (counts.at<float>(v, u) > 0) {
+                const double share = (values.at<float>(v, u) - low) / (high - low);
+                ++mass[1 + static_cast<int>(std::clamp(share * bins, 0.0, bins - 1.0))];
+            }
+    for (int i = 0; i < bins; ++i)
+        moment[i + 1] = moment[i] + mass[i + 1] * i;
+    for (int i = 0; i < bins; ++i)
+        mass[i + 1] += mass[i];
+    const auto between = [&](int from, int to) {
+        const double n = mass[to] - mass[from], m = moment[to] - moment[from];
+        return n > 0 ? m * m / n : 0.0;
+    };
+    double best = -1;
+    std::pair<int, int> cuts;
+    for (int a = 1; a < bins; ++a)
+        for (int b = classes == 3 ? a + 1 : bins; b <= (classes == 3 ? bins - 1 : bins); ++b) {
+            const double sum = between(0, a) + between(a, b) + between(b, bins);
+            if (sum > best) {
+                best = sum;
+                cuts = {a, b};
+            }
+        }
+    std::vector<double> thresholds{low + (high - low) * cuts.first / bins};
+    if (classes == 3)
+        thresholds.push_back(low + (high - low) * cuts.second / bins);
+    return thresholds;
+}
+
+WoodLevels otsu_levels(const cv::Mat& gray, const cv::Mat& valid) {
+    double low = 0, high = 1;
+    cv::minMaxLoc(gray, &low, &high, nullptr, nullptr, valid > 0);
+    const double cut = otsu(gray, valid, 2, low, high + 1e-6).front();
+    return {cv::mean(gray, (gray >= cut) & (valid > 0))[0], cv::mean(gray, (gray < cut) & (valid > 0))[0]};
+}
+
+/// Gives patches of `label` equal to `one` that are smaller than `least` pixels to the class `other`.
+void remove_specks(cv::Mat& label, int one, int other, double least) {
+    cv::Mat patches, figures, centres;
+    const int count = cv::connectedComponentsWithStats(label == one, patches, figures, centres, 8);
+    std::vector<char> small(count, 0);
+    for (int i = 1; i < count; ++i)
+        small[i] = figures.at<int>(i, cv::CC_STAT_AREA) < least;
+    for (int v = 0; v < label.rows; ++v)
+        for (int u = 0; u < label.cols; ++u)
+            if (small[patches.at<int>(v, u)])
+                label.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(other);
+}
+
+}  // namespace
+
+cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
+    cv::Mat numbers(frame, CV_32S, cv::Scalar(static_cast<double>(borders.size())));
+    for (std::size_t i = borders.size(); i-- > 0;)
+        for (int u = std::max(0, borders[i].first); u < std::min(frame.width, borders[i].end()); ++u)
+            for (int v = 0; v < frame.height && v <= borders[i].at(u); ++v)
+                numbers.at<int>(v, u) = static_cast<int>(i);
+    return numbers;
+}
+
+cv::Mat density_degree(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                       const std::vector<BorderLine>& borders, double ring_width, WoodLevels& levels) {
+    const cv::Mat smooth = smooth_wood(gray, valid, rings, ring_width);
+    std::vector<RingLevels> whole;          // rings that lie between two borders
+    std::vector<int> nearest_whole(borders.size() + 1, -1);
+    for (std::size_t i = 1; i < borders.size(); ++i) {
+        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(10, static_cast<int>(ring_width)));
+        if (!ring.empty()) {
+            nearest_whole[i] = static_cast<int>(whole.size());
+            whole.push_back(std::move(ring));
+        }
+    }
+    levels = whole.empty() ? otsu_levels(smooth, valid) : median_levels(whole);
+    for (RingLevels& ring : whole)
+        ring.mend(levels);
+    for (std::size_t i = 1; i < nearest_whole.size(); ++i)
+        if (nearest_whole[i] < 0)
+            nearest_whole[i] = nearest_whole[i - 1];
+    for (std::size_t i = nearest_whole.size() - 1; i-- > 0;)
+        if (nearest_whole[i] < 0)
+            nearest_whole[i] = nearest_whole[i + 1];
+
+    const cv::Mat numbers = ring_numbers(borders, gray.size());
+    cv::Mat degree(gray.size(), CV_32F);
+    const auto distance = [&](std::size_t border, int u, int v) {
+        return border < borders.size() && borders[border].covers(u) ? v - borders[border].at(u)
+                                                                    : std::numeric_limits<double>::infinity();
+    };
+    for (int v = 0; v < gray.rows; ++v) {
+        for (int u = 0; u < gray.cols; ++u) {
+            const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
+            int from = v;
+            if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
+                from = std::max(0, v - 2);
+            else if (ring > 0 && distance(ring - 1, u, v) < mixed)
+                from = std::min(gray.rows - 1, v + 2);
+            const WoodLevels here = nearest_whole[ring] < 0 ? levels : whole[nearest_whole[ring]].at(u);
+            degree.at<float>(v, u) = static_cast<float>((here.earlywood - smooth.at<float>(from, u)) /
+                                                        std::max(here.contrast(), 1e-6));
+        }
+    }
+    return degree;
+}
+
+cv::Mat classify(const cv::Mat& degree, int classes, double ring_width) {
+    std::vector<double> thresholds{0.5};
+    if (classes == 3)
+        thresholds = otsu(degree, cv::Mat::ones(degree.size(), CV_32F), 3, -0.25, 1.25);
+    cv::Mat label = cv::Mat::zeros(degree.size(), CV_8U);
+    for (std::size_t i = 0; i < thresholds.size(); ++i)
+        label.setTo(static_cast<double>(i + 1), degree >= thresholds[i]);
+    cv::medianBlur(label, label, 3);
+    const double least = std::max(9.0, 0.02 * ring_width * ring_width);
+    for (int one = 0; one < classes; ++one)
+        remove_specks(label, one, one > 0 ? one - 1 : 1, least);
+    return label;
+}
+
+}  // namespace crampfit

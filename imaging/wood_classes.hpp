@@ -1,0 +1,33 @@
+#pragma once
+
+#include "imaging/ring_borders.hpp"
+
+#include <opencv2/core.hpp>
+
+#include <vector>
+
+namespace crampfit {
+
+/// Gray of pure EW and pure LW.
+struct WoodLevels {
+    double earlywood = 1;
+    double latewood = 0;
+
+    double contrast() const { return earlywood - latewood; }
+};
+
+/// How far the wood at each pixel of the frame has gone from EW (0) to LW (1) by its gray, each ring measured against its
+/// own brightest and darkest wood, which changes along the ring (the half-range rule: half way is 0.5). Where there is
+/// no whole ring, Otsu's threshold (1979) is half way and the means on its two sides are the ends. Beyond 0 and 1 where
+/// gray is. `levels` gets the medians.
+cv::Mat density_degree(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+                       const std::vector<BorderLine>& borders, double ring_width, WoodLevels& levels);
+
+/// Number of the ring that each pixel of the frame lies in: i up to border i, borders.size() beyond the last.
+cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame);
+
+/// Classes by the degree, without specks: 0 is EW, the last is LW. Two classes part at a half; three at the thresholds
+/// of Otsu's multi-level form.
+cv::Mat classify(const cv::Mat& degree, int classes, double ring_width);
+
+}  // namespace crampfit

@@ -1,0 +1,109 @@
+// The verb `segment` from picture to scene, as a user runs it.
+#include "tests/cli/command.hpp"
+
+#include "datasets/io.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+using namespace crampfit;
+
+namespace {
+
+const std::string picture = std::string(SAMPLES) + "/rings.png";  // 400 x 400 pixels, 25 um, growth about +x
+
+std::vector<std::string> lines_of(const std::string& text) {
+    std::vector<std::string> lines;
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);)
+        lines.push_back(line);
+    return lines;
+}
+
+}  // namespace
+
+TEST(SystemSegment, PictureToTablesAndBackThroughEditedBorders) {
+    Command command;
+    const std::string specimen = command.path("s.h5"), preview = command.path("p.png");
+    const Outcome made = command.run({"segment", picture, "-o", specimen, "--pixel", "25 um", "--preview", preview});
+    ASSERT_EQ(made.status, 0) << made.error;
+    EXPECT_TRUE(contains(made.error, "from --pixel"));
+    EXPECT_TRUE(contains(made.error, "growth +x"));
+    EXPECT_GT(std::filesystem::file_size(preview), 10'000u);
+
+    const Outcome borders = command.run({"csv", specimen, "borders"});
+    ASSERT_EQ(borders.status, 0) << borders.error;
+    EXPECT_EQ(lines_of(borders.out).front(), "ring,x_px,y_px");
+    const Outcome rings = command.run({"csv", specimen, "rings"});
+    EXPECT_EQ(lines_of(rings.out).front(), "ring,width_mm,latewood_fraction");
+    const Outcome orientation = command.run({"csv", specimen, "orientation"});
+    EXPECT_EQ(lines_of(orientation.out).front(), "x_px,y_px,radial_deg,coherency");
+    EXPECT_EQ(lines_of(orientation.out).size(), 1u + 100 * 100);
+
+    // Without the first ring's border there is a ring less.
+    std::string edited;
+    for (const std::string& line : lines_of(borders.out))
+        if (line.rfind("1,", 0) != 0)
+            edited += line + '\n';
+    command.folder.write("edited.csv", edited);
+    const std::string again = command.path("again.h5");
+    const Outcome redone = command.run({"segment", picture, "-o", again, "--pixel", "25 um", "--borders", command.path("edited.csv")});
+    ASSERT_EQ(redone.status, 0) << redone.error;
+    EXPECT_EQ(lines_of(command.run({"csv", again, "rings"}).out).size() + 1, lines_of(rings.out).size());
+}
+
+TEST(SystemSegment, ASceneStandsOnTheSpecimen) {
+    Command command;
+    ASSERT_EQ(command.run({"segment", picture, "-o", command.path("s.h5"), "--pixel", "25 um", "--quiet"}).status, 0);
+    std::ifstream sample(std::string(SAMPLES) + "/tension_tr_plus.toml");
+    std::string scene;
+    for (std::string line; std::getline(sample, line);) {
+        if (line.rfind("pixel =", 0) == 0 || line.rfind("classes =", 0) == 0 || line.rfind("between =", 0) == 0)
+            continue;
+        scene += (line.rfind("image =", 0) == 0 ? "file = \"s.h5\"" : line) + '\n';
+    }
+    command.folder.write("scene.toml", scene);
+    const Outcome run = command.run({"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--set", "model.cell=0.5 mm",
+                                     "--set", "edges.top.velocity=[\"0 m/s\", \"1 mm/min\"]"});
+    ASSERT_EQ(run.status, 0) << run.error;
+    const Record record = read_record(command.folder / "r.h5");
+    const auto [low, high] = std::minmax_element(record.point_latewood.begin(), record.point_latewood.end());
+    EXPECT_EQ(*low, 0);
+    EXPECT_EQ(*high, 1);
+
+    ASSERT_EQ(command.run({"segment", picture, "-o", command.path("s.h5")}).status, 0);
+    const Outcome refused = command.run({"explain", command.path("scene.toml")});
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_TRUE(contains(refused.error, "has no scale")) << refused.error;
+}
+
+TEST(SystemSegment, BadUseIsNamedAndLeavesNothing) {
+    Command command;
+    const std::string out = command.path("s.h5");
+    const auto refused = [&](std::vector<std::string> more, const std::string& phrase) {
+        std::vector<std::string> words{"segment", picture, "-o", out};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << phrase;
+        EXPECT_TRUE(contains(outcome.error, phrase)) << outcome.error;
+        EXPECT_FALSE(std::filesystem::exists(out));
+    };
+    refused({"--pixel", "25"}, "unit");
+    refused({"--pixel", "0 um"}, "--pixel");
+    refused({"--pixel", "5 kg"}, "--pixel");
+    refused({"--classes", "4"}, "--classes");
+    refused({"--growth", "north"}, "--growth");
+    refused({"--borders", command.path("none.csv")}, "no such file");
+    refused({"--borders", command.folder.write("a.csv", "ring,x_px\n1,2\n").string()}, "ring, x_px and y_px");
+    refused({"--borders", command.folder.write("b.csv", "ring,x_px,y_px\n1,2,3\n1,x,5\n").string()}, "x_px, line 3");
+    refused({"--borders", command.folder.write("c.csv", "ring,x_px,y_px\n1,2,3\n").string()}, "at least 2 vertices");
+    refused({"--borders", command.folder.write("d.csv", "ring,x_px,y_px\n").string()}, "no borders");
+    refused({"--preview", command.path("p.nothing")}, "--preview");
+    refused({"--set", "a=1"}, "--set");
+    const Outcome none = command.run({"segment", command.path("none.png"), "-o", out});
+    EXPECT_EQ(none.status, 2);
+    EXPECT_TRUE(contains(none.error, "no such file"));
+}
