@@ -1,9 +1,11 @@
+#include "datasets/displacement_field.hpp"
 #include "datasets/error.hpp"
 #include "datasets/hdf5.hpp"
 #include "datasets/io.hpp"
 #include "datasets/record_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ostream.h>
 #include <fmt/ranges.h>
 
 #include <functional>
@@ -178,6 +180,26 @@ std::vector<Offer> offers(const Fit& fit) {
             {"correlation", [&] { return correlation_table(fit); }}};
 }
 
+// ---- tables of displacement fields, which may be too large to be held at once
+
+void print_points(const std::filesystem::path& file, std::ostream& out) {
+    print({{"image", "x_px", "y_px", "u_px", "v_px", "exx", "eyy", "exy", "zncc", "sigma_px", "status"}}, out);
+    read_fields(file, [&](const FieldSeries& series, int image, const DisplacementField& field) {
+        for (int point = 0; point < series.lattice.count(); ++point) {
+            const auto i = static_cast<std::size_t>(point);
+            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point), series.lattice.y(point), field.u[i],
+                       field.v[i], field.exx[i], field.eyy[i], field.exy[i], field.zncc[i], field.sigma[i], name(field.status[i]));
+        }
+    });
+}
+
+Table image_table(const std::string& reference, const std::vector<std::string>& images) {
+    Table table{{"image", "file"}, {"reference", reference}};
+    for (std::size_t i = 0; i < images.size(); ++i)
+        table.push_back({std::to_string(i), images[i]});
+    return table;
+}
+
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
                   std::ostream& out) {
     std::vector<std::string> names;
@@ -201,6 +223,11 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     } else if (kind == "fit") {
         const Fit fit = read_fit(file);
         print_one_of(offers(fit), file, table, out);
+    } else if (kind == "field" && table == "points") {
+        print_points(file, out);
+    } else if (kind == "field") {
+        const FieldSeries series = read_field_series(file);
+        print_one_of({{"points", {}}, {"images", [&] { return image_table(series.reference, series.images); }}}, file, table, out);
     } else {
         print_one_of({}, file, table, out);
     }

@@ -102,20 +102,17 @@ std::vector<std::uint8_t> read_bytes(const std::filesystem::path& file, const Pi
     return bytes;
 }
 
-cv::Mat to_gray(const cv::Mat& picture) {
+cv::Mat to_gray(const cv::Mat& picture, int depth) {
     cv::Mat gray = picture;
     if (picture.channels() == 3) {
         cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
     }
-    if (gray.depth() == CV_16U) {
-        gray.convertTo(gray, CV_8U, 1.0 / 257.0);
-    }
+    gray.convertTo(gray, depth, gray.depth() == CV_16U ? 1.0 / 257.0 : 1.0);
     return gray;
 }
 
-}  // namespace
-
-GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+/// One channel of the depth that is asked for.
+cv::Mat decode(const std::filesystem::path& file, const PictureKey& asked_by, int depth) {
     const auto fail = [&](const std::string& rule) {
         throw InputError(asked_by.file, asked_by.key, file.string(), rule);
     };
@@ -133,11 +130,23 @@ GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked
         if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
             fail("must be a picture of 8 or 16 bits a channel");
         }
-        gray = to_gray(picture);
+        gray = to_gray(picture, depth);
     } catch (const cv::Exception&) {
         fail("is damaged, or its header asks for more than 2^28 pixels");
     }
+    return gray;
+}
+
+}  // namespace
+
+GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+    const cv::Mat gray = decode(file, asked_by, CV_8U);
     return {gray.cols, gray.rows, {gray.begin<std::uint8_t>(), gray.end<std::uint8_t>()}};
+}
+
+FinePicture read_fine_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+    const cv::Mat gray = decode(file, asked_by, CV_32F);
+    return {gray.cols, gray.rows, {gray.begin<float>(), gray.end<float>()}};
 }
 
 }  // namespace crampfit

@@ -1,0 +1,158 @@
+#include "imaging/correlate.hpp"
+
+#include "datasets/error.hpp"
+#include "imaging/spreading.hpp"
+#include "imaging/strain.hpp"
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crampfit {
+namespace {
+
+constexpr int border = 6;  // pixels from the outermost subsets to the picture's edge: room for smoothing and small displacements
+
+/// As many points as there is room for, with what is left over shared between both sides.
+PointLattice lattice_of(const FinePicture& picture, const CorrelateOptions& options) {
+    const auto along = [&](int count) {
+        const int room = count - options.subset - 2 * border;
+        return std::pair{room / options.step + 1, border + options.subset / 2 + room % options.step / 2};
+    };
+    const auto [columns, first_x] = along(picture.columns);
+    const auto [rows, first_y] = along(picture.rows);
+    return {columns, rows, first_x, first_y, options.step};
+}
+
+/// Number of left-out pixels above and to the left of each corner of a pixel [(rows + 1) x (columns + 1)].
+std::vector<int> count_masked(const std::vector<std::uint8_t>& mask, int columns, int rows) {
+    const std::size_t stride = static_cast<std::size_t>(columns) + 1;
+    std::vector<int> above(stride * (static_cast<std::size_t>(rows) + 1), 0);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(rows); ++y) {
+        int in_row = 0;
+        for (std::size_t x = 0; x + 1 < stride; ++x) {
+            in_row += mask[y * (stride - 1) + x] == 0 ? 1 : 0;
+            above[(y + 1) * stride + x + 1] = above[y * stride + x + 1] + in_row;
+        }
+    }
+    return above;
+}
+
+void require_contrast(const FinePicture& picture, const std::string& name) {
+    const auto [least, most] = std::ranges::minmax_element(picture.gray);
+    if (*least == *most)
+        throw InputError("command line", "picture", name, fmt::format("has gray {} only: there is nothing to follow", *least));
+}
+
+/// A reference that can be followed.
+FinePicture checked(FinePicture picture, const CorrelateOptions& options, const std::string& name) {
+    if (const int least = options.subset + 2 * border; picture.columns < least || picture.rows < least)
+        throw InputError("command line", "reference", name,
+                         fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns, picture.rows,
+                                     options.subset, least, least));
+    require_contrast(picture, name);
+    return picture;
+}
+
+/// Gaussian weights, from -3 to 3 radii or a little more.
+cv::Mat kernel_of(double radius) { return cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * radius)) + 1, radius, CV_32F); }
+
+/// Smoothing weighs a picture's coarse features more than its finest, which cameras get wrong: a picture that was resampled by
+/// linear interpolation (as raw colour mosaics and rectified pictures are) at a fraction t of a pixel has its details of wave
+/// length L moved by t (1 - t) (1 - 2 t) / 6 (2 pi / L)^2 px too far or too little. That noise is smoothed too gains little or nothing,
+/// as all pixels of a subset are summed up anyway. About the bias by interpolation: Pan (2013), "Bias error reduction of digital
+/// image correlation using Gaussian pre-filtering".
+FinePicture smooth(FinePicture picture, double radius) {
+    if (radius == 0)
+        return picture;
+    cv::Mat gray(picture.rows, picture.columns, CV_32F, picture.gray.data());
+    const cv::Mat kernel = kernel_of(radius);
+    cv::sepFilter2D(gray.clone(), gray, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
+    return picture;
+}
+
+/// White noise of the camera is no longer white once it is smoothed. With residual variance s^2 and slopes J of the smoothed
+/// reference, the displacement's variance is not s^2 / |J|^2 but s^2 |k * J|^2 / (|k|^2 |J|^4), k the kernel: the root of the ratio,
+/// over the whole reference and both directions.
+double noise_gain(const ReferencePicture& reference, double radius) {
+    if (radius == 0)
+        return 1;
+    const cv::Mat kernel = kernel_of(radius);
+    double squared = 0, smoothed_squared = 0;
+    for (const std::vector<float>* slope : {&reference.slopes.by_x, &reference.slopes.by_y}) {
+        const cv::Mat sharp(reference.picture.rows, reference.picture.columns, CV_32F, const_cast<float*>(slope->data()));
+        cv::Mat smoothed;
+        cv::sepFilter2D(sharp, smoothed, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
+        squared += sharp.dot(sharp);
+        smoothed_squared += smoothed.dot(smoothed);
+    }
+    return std::sqrt(smoothed_squared / squared) / kernel.dot(kernel);
+}
+
+}  // namespace
+
+void CorrelateOptions::validate() const {
+    const auto fail = [](const char* option, int value, const char* rule) {
+        throw InputError("command line", option, std::to_string(value), rule);
+    };
+    if (subset < 5 || subset > 501 || subset % 2 == 0)
+        fail("--subset", subset, "must be an odd number of pixels from 5 to 501");
+    if (step < 1 || step > 1000)
+        fail("--step", step, "must be from 1 to 1000 pixels");
+    if (order != 1 && order != 2)
+        fail("--order", order, "must be 1 or 2");
+    if (!(smoothing >= 0 && smoothing <= 20))
+        throw InputError("command line", "--smoothing", fmt::format("{}", smoothing), "must be from 0 to 20 pixels");
+}
+
+Correlator::Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
+                       const std::string& name)
+    : options_(options), reference_(smooth(checked(std::move(reference), options, name), options.smoothing)),
+      noise_gain_(noise_gain(reference_, options.smoothing)), lattice_(lattice_of(reference_.picture, options)) {
+    const FinePicture& picture = reference_.picture;
+    at_start_.assign(static_cast<std::size_t>(lattice_.count()), PointStatus::not_reached);
+    if (mask.empty())
+        return;
+    const std::vector<int> masked = count_masked(mask, picture.columns, picture.rows);
+    const auto count = [&](int x, int y) { return masked[static_cast<std::size_t>(y) * (static_cast<std::size_t>(picture.columns) + 1) + static_cast<std::size_t>(x)]; };
+    const int half = options.subset / 2;
+    for (int point = 0; point < lattice_.count(); ++point) {
+        const int x = lattice_.x(point), y = lattice_.y(point);
+        PointStatus& status = at_start_[static_cast<std::size_t>(point)];
+        if (mask[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.columns) + static_cast<std::size_t>(x)] == 0)
+            status = PointStatus::masked;
+        else if (count(x + half + 1, y + half + 1) - count(x - half, y + half + 1) - count(x + half + 1, y - half) + count(x - half, y - half) > 0)
+            status = PointStatus::across_mask;
+    }
+}
+
+void Correlator::check(const FinePicture& image, const std::string& name) const {
+    const FinePicture& reference = reference_.picture;
+    if (image.columns != reference.columns || image.rows != reference.rows)
+        throw InputError("command line", "image", name,
+                         fmt::format("is {} x {} pixels, the reference {} x {}: all must have one size", image.columns, image.rows,
+                                     reference.columns, reference.rows));
+    require_contrast(image, name);
+}
+
+DisplacementField Correlator::field(const FinePicture& image) const {
+    const std::vector<SubsetMatch> matches =
+        spread_matches(reference_, smooth(image, options_.smoothing), lattice_, at_start_, options_.subset, options_.order, options_.threads);
+    DisplacementField field;
+    const double lost = std::numeric_limits<double>::quiet_NaN();
+    for (const SubsetMatch& match : matches) {
+        const bool ok = match.status == PointStatus::ok;
+        field.u.push_back(ok ? match.warp.u[0] : lost);
+        field.v.push_back(ok ? match.warp.v[0] : lost);
+        field.zncc.push_back(ok ? match.zncc : lost);
+        field.sigma.push_back(ok ? noise_gain_ * match.sigma : lost);
+        field.status.push_back(match.status);
+    }
+    add_strain(lattice_, field);
+    return field;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "datasets/displacement_field.hpp"
+#include "imaging/gray_picture.hpp"
+
+#include <filesystem>
+
+namespace crampfit {
+
+/// Throws InputError unless the file's name ends as that of a picture that can be written and it could be written now.
+void require_picture_name(const std::filesystem::path& file, const std::string& option);
+
+/// Draws a displacement field over the reference: u on the left, v on the right, in colours with their scale, lost points as
+/// crosses. Throws InputError when the file cannot be written.
+void draw_field(const FinePicture& reference, const PointLattice& lattice, const DisplacementField& field,
+                const std::filesystem::path& file);
+
+}  // namespace crampfit
