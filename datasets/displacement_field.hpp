@@ -20,7 +20,7 @@ enum class PointStatus : std::uint8_t {
     no_convergence,    // the iteration did not settle
     left_picture,      // its subset lies partly outside the image
     low_correlation,   // what was found looks different
-    across_crack,      // displacements on either side of it do not join
+    moved_apart,       // parts of its subset went different ways, as across a crack
 };
 
 inline constexpr std::size_t point_status_count = 9;

@@ -10,8 +10,8 @@ using hdf5::Group;
 namespace {
 
 constexpr std::array<const char*, point_status_count> status_names{
-    "ok",          "masked",         "across the mask",  "no contrast",     "not reached",
-    "no convergence", "left the picture", "low correlation", "across a crack"};
+    "ok",          "masked",         "across the mask",  "no contrast", "not reached", "no convergence",
+    "left the picture", "low correlation", "moved apart"};
 
 struct FieldColumn {
     const char* name;

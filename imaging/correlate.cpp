@@ -5,10 +5,8 @@
 #include "imaging/strain.hpp"
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace crampfit {
@@ -57,39 +55,24 @@ FinePicture checked(FinePicture picture, const CorrelateOptions& options, const 
     return picture;
 }
 
-/// Gaussian weights, from -3 to 3 radii or a little more.
-cv::Mat kernel_of(double radius) { return cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * radius)) + 1, radius, CV_32F); }
+constexpr double most_apart = 0.1;  // root mean square over a subset of motion that its warp does not follow [px]
 
-/// Smoothing weighs a picture's coarse features more than its finest, which cameras get wrong: a picture that was resampled by
-/// linear interpolation (as raw colour mosaics and rectified pictures are) at a fraction t of a pixel has its details of wave
-/// length L moved by t (1 - t) (1 - 2 t) / 6 (2 pi / L)^2 px too far or too little. That noise is smoothed too gains little or nothing,
-/// as all pixels of a subset are summed up anyway. About the bias by interpolation: Pan (2013), "Bias error reduction of digital
-/// image correlation using Gaussian pre-filtering".
-FinePicture smooth(FinePicture picture, double radius) {
-    if (radius == 0)
-        return picture;
-    cv::Mat gray(picture.rows, picture.columns, CV_32F, picture.gray.data());
-    const cv::Mat kernel = kernel_of(radius);
-    cv::sepFilter2D(gray.clone(), gray, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
-    return picture;
-}
-
-/// White noise of the camera is no longer white once it is smoothed. With residual variance s^2 and slopes J of the smoothed
-/// reference, the displacement's variance is not s^2 / |J|^2 but s^2 |k * J|^2 / (|k|^2 |J|^4), k the kernel: the root of the ratio,
-/// over the whole reference and both directions.
-double noise_gain(const ReferencePicture& reference, double radius) {
-    if (radius == 0)
-        return 1;
-    const cv::Mat kernel = kernel_of(radius);
-    double squared = 0, smoothed_squared = 0;
-    for (const std::vector<float>* slope : {&reference.slopes.by_x, &reference.slopes.by_y}) {
-        const cv::Mat sharp(reference.picture.rows, reference.picture.columns, CV_32F, const_cast<float*>(slope->data()));
-        cv::Mat smoothed;
-        cv::sepFilter2D(sharp, smoothed, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
-        squared += sharp.dot(sharp);
-        smoothed_squared += smoothed.dot(smoothed);
-    }
-    return std::sqrt(smoothed_squared / squared) / kernel.dot(kernel);
+/// A subset that reaches over a crack matches neither side, and yet may correlate well. It shows in what is left of its grays:
+/// more than noise leaves elsewhere in the picture, and as much as motion by `most_apart` makes of the slopes.
+void drop_torn(std::vector<SubsetMatch>& matches) {
+    std::vector<double> residuals;
+    for (const SubsetMatch& match : matches)
+        if (match.status == PointStatus::ok)
+            residuals.push_back(match.residual);
+    if (residuals.empty())
+        return;
+    const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+    std::ranges::nth_element(residuals, middle);
+    const double noise = *middle;
+    for (SubsetMatch& match : matches)
+        if (match.status == PointStatus::ok && match.residual > 2 * noise &&
+            match.residual - noise > most_apart * most_apart * match.slope)
+            match.status = PointStatus::moved_apart;
 }
 
 }  // namespace
@@ -110,8 +93,8 @@ void CorrelateOptions::validate() const {
 
 Correlator::Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
                        const std::string& name)
-    : options_(options), reference_(smooth(checked(std::move(reference), options, name), options.smoothing)),
-      noise_gain_(noise_gain(reference_, options.smoothing)), lattice_(lattice_of(reference_.picture, options)) {
+    : options_(options), reference_(checked(std::move(reference), options, name), options.smoothing),
+      lattice_(lattice_of(reference_.picture, options)) {
     const FinePicture& picture = reference_.picture;
     at_start_.assign(static_cast<std::size_t>(lattice_.count()), PointStatus::not_reached);
     if (mask.empty())
@@ -139,8 +122,9 @@ void Correlator::check(const FinePicture& image, const std::string& name) const 
 }
 
 DisplacementField Correlator::field(const FinePicture& image) const {
-    const std::vector<SubsetMatch> matches =
-        spread_matches(reference_, smooth(image, options_.smoothing), lattice_, at_start_, options_.subset, options_.order, options_.threads);
+    std::vector<SubsetMatch> matches =
+        spread_matches(reference_, image, lattice_, at_start_, options_.subset, options_.order, options_.threads);
+    drop_torn(matches);
     DisplacementField field;
     const double lost = std::numeric_limits<double>::quiet_NaN();
     for (const SubsetMatch& match : matches) {
@@ -148,7 +132,7 @@ DisplacementField Correlator::field(const FinePicture& image) const {
         field.u.push_back(ok ? match.warp.u[0] : lost);
         field.v.push_back(ok ? match.warp.v[0] : lost);
         field.zncc.push_back(ok ? match.zncc : lost);
-        field.sigma.push_back(ok ? noise_gain_ * match.sigma : lost);
+        field.sigma.push_back(ok ? match.sigma : lost);
         field.status.push_back(match.status);
     }
     add_strain(lattice_, field);

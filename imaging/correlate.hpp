@@ -12,7 +12,7 @@ struct CorrelateOptions {
     int subset = 31;        // edge of a subset, odd [px]
     int step = 10;          // between points [px]
     int order = 1;          // of the warp within a subset: 1 or 2
-    double smoothing = 1.75;  // radius (standard deviation) of the Gaussian that both pictures are smoothed with, 0 for none [px]
+    double smoothing = 2.5; // radius of the Gaussian that smooths the reference's slopes, 0 for none (subset.hpp) [px]
     int threads = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.
@@ -39,7 +39,6 @@ class Correlator {
   private:
     CorrelateOptions options_;
     ReferencePicture reference_;
-    double noise_gain_;  // standard error of a displacement by that which white noise would give
     PointLattice lattice_;
     std::vector<PointStatus> at_start_;  // of each point: not_reached, or why it cannot be followed in any image
 };

@@ -78,6 +78,12 @@ cv::Mat draw_map(const FinePicture& reference, const PointLattice& lattice, cons
     return map;
 }
 
+void write_drawing(const cv::Mat& drawing, const std::filesystem::path& file) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(file.extension().string(), drawing, bytes);
+    write_whole_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 }  // namespace
 
 void require_picture_name(const std::filesystem::path& file, const std::string& option) {
@@ -90,9 +96,21 @@ void draw_field(const FinePicture& reference, const PointLattice& lattice, const
                 const std::filesystem::path& file) {
     cv::Mat both;
     cv::hconcat(draw_map(reference, lattice, field.u, "u"), draw_map(reference, lattice, field.v, "v"), both);
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(file.extension().string(), both, bytes);
-    write_whole_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    write_drawing(both, file);
+}
+
+void draw_track(const FinePicture& image, const std::vector<CrackTip>& tips, const std::filesystem::path& file) {
+    cv::Mat drawing = faded(image);
+    const auto pixel = [](const Vec2& place) { return cv::Point(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y()))); };
+    for (const CrackTip& tip : tips)
+        if (tip.status == TipStatus::ok)
+            cv::circle(drawing, pixel(tip.tip), 3, {200, 80, 0}, 1, cv::LINE_AA);
+    if (const CrackTip& last = tips.back(); last.status == TipStatus::ok) {
+        const Vec2 mouth = last.tip - last.length * Vec2(std::cos(last.angle), std::sin(last.angle));
+        cv::line(drawing, pixel(mouth), pixel(last.tip), {0, 0, 220}, 1, cv::LINE_AA);
+        cv::drawMarker(drawing, pixel(last.tip), {0, 0, 220}, cv::MARKER_CROSS, 15, 2);
+    }
+    write_drawing(drawing, file);
 }
 
 }  // namespace crampfit

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "datasets/crack_track.hpp"
 #include "datasets/displacement_field.hpp"
 #include "imaging/gray_picture.hpp"
 
@@ -14,5 +15,9 @@ void require_picture_name(const std::filesystem::path& file, const std::string& 
 /// crosses. Throws InputError when the file cannot be written.
 void draw_field(const FinePicture& reference, const PointLattice& lattice, const DisplacementField& field,
                 const std::filesystem::path& file);
+
+/// Draws the tips of a series over the image of the last, at the places that their material has in the reference, and the
+/// crack's line behind the last. Throws InputError when the file cannot be written.
+void draw_track(const FinePicture& image, const std::vector<CrackTip>& tips, const std::filesystem::path& file);
 
 }  // namespace crampfit

@@ -28,7 +28,7 @@ template <int Order> class Spreading {
               const std::vector<PointStatus>& at_start, int subset, int threads)
         : reference_(reference), image_(image), spline_(image), lattice_(lattice), half_(subset / 2), threads_(threads) {
         for (const PointStatus status : at_start)
-            matches_.push_back({status, {}, 0, 0});
+            matches_.emplace_back().status = status;
         chosen_.assign(at_start.size(), false);
         for (int i = 0; i < threads; ++i)
             matchers_.emplace_back(reference_, spline_, subset);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -14,16 +15,20 @@ constexpr int reach = 3;             // points to either side
 constexpr int edge = 2 * reach + 1;  // of the window
 constexpr int least_points = 12;     // twice the polynomial's coefficients
 
+/// The window about a point along one direction, moved so that it does not stick out of the lattice: its first place.
+int window_begin(int at, int count) { return std::clamp(at - reach, 0, std::max(0, count - edge)); }
+
 /// Places in the window about a point that are joined to it through followed points, as offsets.
 std::vector<std::array<int, 2>> joined(const PointLattice& lattice, const DisplacementField& field, int point) {
     const int column = point % lattice.columns, row = point / lattice.columns;
+    const int left = window_begin(column, lattice.columns) - column, top = window_begin(row, lattice.rows) - row;
+    const int right = std::min(left + edge, lattice.columns - column), bottom = std::min(top + edge, lattice.rows - row);
     std::array<bool, edge * edge> seen{};
     std::vector<std::array<int, 2>> places;
     const auto visit = [&](int dx, int dy) {
-        if (std::abs(dx) > reach || std::abs(dy) > reach || column + dx < 0 || column + dx >= lattice.columns || row + dy < 0 ||
-            row + dy >= lattice.rows)
+        if (dx < left || dx >= right || dy < top || dy >= bottom)
             return;
-        bool& here = seen[static_cast<std::size_t>((dy + reach) * edge + dx + reach)];
+        bool& here = seen[static_cast<std::size_t>((dy - top) * edge + dx - left)];
         const int neighbour = point + dx + dy * lattice.columns;
         if (!here && field.status[static_cast<std::size_t>(neighbour)] == PointStatus::ok)
             places.push_back({dx, dy});

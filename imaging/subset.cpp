@@ -1,5 +1,7 @@
 #include "imaging/subset.hpp"
 
+#include <opencv2/imgproc.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,11 +14,21 @@ constexpr int most_iterations = 30;
 constexpr double settled = 5e-4;           // last step anywhere at the subset's edge [px]: what is left is a tenth of it
 
 /// Powers of xi and eta in the terms of a warp.
-constexpr std::array<std::array<int, 2>, 6> powers{{{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}};
+constexpr std::array<std::array<std::size_t, 2>, 6> powers{{{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}};
 
 template <class Lanes, std::size_t Count> void clear(std::array<Lanes, Count>& sums) {
     for (Lanes& sum : sums)
         sum.setZero();
+}
+
+/// Adds each of `values` times 1, xi, xi^2, ... to its sums.
+template <class Lanes, std::size_t Count, std::size_t Kinds>
+void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lanes& xi, std::array<Lanes, Kinds> values) {
+    for (std::size_t power = 0; power < Count; ++power)
+        for (std::size_t kind = 0; kind < Kinds; ++kind) {
+            sums[kind][power] += values[kind];
+            values[kind] *= xi;
+        }
 }
 
 /// The warp as a matrix that acts on monomials of the place in the subset, so that one warp after another is a product: on
@@ -78,6 +90,13 @@ double reach(const std::array<double, 6>& terms) {
     return sum;
 }
 
+FinePicture smooth(FinePicture picture, double radius) {
+    const cv::Mat kernel = cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * radius)) + 1, radius, CV_32F);
+    cv::Mat gray(picture.rows, picture.columns, CV_32F, picture.gray.data());
+    cv::sepFilter2D(gray.clone(), gray, CV_32F, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
+    return picture;
+}
+
 /// Spline values at `width` places: lane i lies (tx, ty) from the coefficient `at` + i.
 template <class Lanes> Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const Lanes& ty) {
     const auto weights = [](const Lanes& t) {
@@ -100,7 +119,9 @@ template <class Lanes> Lanes interpolate(const float* at, std::ptrdiff_t stride,
 
 }  // namespace
 
-ReferencePicture::ReferencePicture(FinePicture fine) : picture(std::move(fine)), slopes(SplinePicture(picture).slopes()) {}
+ReferencePicture::ReferencePicture(FinePicture fine, double smoothing)
+    : picture(std::move(fine)), slopes(SplinePicture(picture).slopes()),
+      smooth_slopes(smoothing == 0 ? slopes : SplinePicture(smooth(picture, smoothing)).slopes()) {}
 
 template <int Order>
 SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const SplinePicture& image, int subset)
@@ -112,10 +133,9 @@ SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const Spl
         inside_.push_back((from_left < static_cast<float>(subset)).template cast<float>());
         xi_.push_back((from_left - static_cast<float>(half_)) / static_cast<float>(half_));
     }
-    for (std::vector<Lanes>* lanes : {&gray_, &by_x_, &by_y_})
+    for (std::vector<Lanes>* lanes : {&gray_, &by_x_, &by_y_, &smooth_by_x_, &smooth_by_y_})
         lanes->assign(count, Lanes::Zero());
-    for (std::vector<float>* line : {&place_x_, &place_y_, &sampled_})
-        line->assign(blocks * width, 0.0f);
+    sampled_.assign(blocks * width, 0.0f);
 }
 
 /// False when the subset is flat.
@@ -131,6 +151,8 @@ template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
     copy(reference_.picture.gray, gray_);
     copy(reference_.slopes.by_x, by_x_);
     copy(reference_.slopes.by_y, by_y_);
+    copy(reference_.smooth_slopes.by_x, smooth_by_x_);
+    copy(reference_.smooth_slopes.by_y, smooth_by_y_);
 
     const double count = subset * subset;
     Lanes sum = Lanes::Zero();
@@ -147,69 +169,73 @@ template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
 }
 
 // The steepest descents are the slopes times the monomials of the warp. Sums of products of two of them are moments of
-// slope products: sum of fx^2 xi^a eta^b, and so on with fx fy and fy^2, a + b up to twice the order. The gray's offset and
-// gain are free in ZNSSD, and what of the descents they can make up for is taken off: descents less their mean and less their
-// part along the reference's gray.
-template <int Order> void SubsetMatcher<Order>::make_hessian() {
+// slope products: sum of fx fx xi^a eta^b and so on, a + b up to twice the order. The gray's offset and gain are free in ZNSSD,
+// and what of the descents they can make up for is taken off: descents less their mean and less their part along the
+// reference's gray.
+template <int Order> void SubsetMatcher<Order>::make_matrices() {
     constexpr int degree = 2 * Order;
-    std::array<std::array<std::array<double, degree + 1>, degree + 1>, 3> moments{};
-    descent_.setZero();
-    descent_by_gray_.setZero();
+    std::array<std::array<std::array<double, degree + 1>, degree + 1>, 7> moments{};
+    std::array<std::array<double, terms>, 8> sums{};  // of the smooth slopes and the slopes, by x and y, alone and times the gray
     for (int row = 0; row <= 2 * half_; ++row) {
-        std::array<std::array<Lanes, degree + 1>, 3> along;
-        std::array<std::array<Lanes, Order + 1>, 4> first;
-        for (auto& sums : along)
-            clear(sums);
-        for (auto& sums : first)
-            clear(sums);
+        std::array<std::array<Lanes, degree + 1>, 7> along;
+        std::array<std::array<Lanes, Order + 1>, 8> first;
+        for (auto& lanes : along)
+            clear(lanes);
+        for (auto& lanes : first)
+            clear(lanes);
         for (int block = 0; block < blocks_; ++block) {
             const auto at = static_cast<std::size_t>(row * blocks_ + block);
-            const Lanes &xi = xi_[static_cast<std::size_t>(block)], &fx = by_x_[at], &fy = by_y_[at];
-            std::array<Lanes, 3> products{fx * fx, fx * fy, fy * fy};
-            std::array<Lanes, 4> singles{fx, fy, fx * gray_[at], fy * gray_[at]};
-            for (std::size_t a = 0; a <= degree; ++a)
-                for (std::size_t kind = 0; kind < 3; ++kind) {
-                    along[kind][a] += products[kind];
-                    products[kind] *= xi;
-                }
-            for (std::size_t a = 0; a <= Order; ++a)
-                for (std::size_t kind = 0; kind < 4; ++kind) {
-                    first[kind][a] += singles[kind];
-                    singles[kind] *= xi;
-                }
+            const Lanes &xi = xi_[static_cast<std::size_t>(block)], &f = gray_[at];
+            const Lanes &fx = by_x_[at], &fy = by_y_[at], &sx = smooth_by_x_[at], &sy = smooth_by_y_[at];
+            add_by_powers(along, xi, {sx * fx, sx * fy, sy * fx, sy * fy, sx * sx, sx * sy, sy * sy});
+            add_by_powers(first, xi, {sx, sy, sx * f, sy * f, fx, fy, fx * f, fy * f});
         }
         const double eta = static_cast<double>(row - half_) / half_;
-        for (std::size_t kind = 0; kind < 3; ++kind)
-            for (int a = 0; a <= degree; ++a) {
-                double sum = static_cast<double>(along[kind][static_cast<std::size_t>(a)].sum());
-                for (int b = 0; a + b <= degree; ++b, sum *= eta)
-                    moments[kind][static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] += sum;
+        for (std::size_t kind = 0; kind < moments.size(); ++kind)
+            for (std::size_t a = 0; a <= degree; ++a) {
+                double sum = static_cast<double>(along[kind][a].sum());
+                for (std::size_t b = 0; a + b <= degree; ++b, sum *= eta)
+                    moments[kind][a][b] += sum;
             }
-        for (int m = 0; m < terms; ++m) {
-            const auto [a, b] = powers[static_cast<std::size_t>(m)];
-            const double by_eta = b == 0 ? 1.0 : b == 1 ? eta : eta * eta;
-            const auto sum = [&](std::size_t kind) { return by_eta * static_cast<double>(first[kind][static_cast<std::size_t>(a)].sum()); };
-            descent_[m] += sum(0);
-            descent_[terms + m] += sum(1);
-            descent_by_gray_[m] += sum(2);
-            descent_by_gray_[terms + m] += sum(3);
-        }
+        const std::array<double, 3> by_eta{1, eta, eta * eta};
+        for (std::size_t kind = 0; kind < sums.size(); ++kind)
+            for (std::size_t m = 0; m < terms; ++m)
+                sums[kind][m] += by_eta[powers[m][1]] * static_cast<double>(first[kind][powers[m][0]].sum());
     }
-    Square hessian;
-    for (int m = 0; m < terms; ++m)
-        for (int n = 0; n < terms; ++n) {
-            const auto moment = [&](std::size_t kind) {
-                const auto& [a, b] = powers[static_cast<std::size_t>(m)];
-                const auto& [c, d] = powers[static_cast<std::size_t>(n)];
-                return moments[kind][static_cast<std::size_t>(a + c)][static_cast<std::size_t>(b + d)];
-            };
-            hessian(m, n) = moment(0);
-            hessian(m, terms + n) = hessian(terms + n, m) = moment(1);
-            hessian(terms + m, terms + n) = moment(2);
+    Square tangent;
+    for (std::size_t m = 0; m < terms; ++m)
+        for (std::size_t n = 0; n < terms; ++n) {
+            const auto moment = [&](std::size_t kind) { return moments[kind][powers[m][0] + powers[n][0]][powers[m][1] + powers[n][1]]; };
+            const auto i = static_cast<Eigen::Index>(m), j = static_cast<Eigen::Index>(n);
+            tangent(i, j) = moment(0);
+            tangent(i, terms + j) = moment(1);
+            tangent(terms + i, j) = moment(2);
+            tangent(terms + i, terms + j) = moment(3);
+            noise_(i, j) = moment(4);
+            noise_(i, terms + j) = noise_(terms + j, i) = moment(5);
+            noise_(terms + i, terms + j) = moment(6);
         }
-    const double count = (2 * half_ + 1) * (2 * half_ + 1);
-    hessian -= descent_ * descent_.transpose() / count + descent_by_gray_ * descent_by_gray_.transpose() / (norm_ * norm_);
-    hessian_.compute(hessian);
+    const auto both = [&](std::size_t kind) {  // by x, then by y
+        Parameters parameters;
+        parameters << Eigen::Map<const Eigen::Vector<double, terms>>(sums[kind].data()),
+            Eigen::Map<const Eigen::Vector<double, terms>>(sums[kind + 1].data());
+        return parameters;
+    };
+    descent_ = both(0);
+    descent_by_gray_ = both(2);
+    const double count = (2 * half_ + 1) * (2 * half_ + 1), squares = norm_ * norm_;
+    slope_ = (moments[0][0][0] + moments[3][0][0]) / (2 * count);
+    tangent -= descent_ * both(4).transpose() / count + descent_by_gray_ * both(6).transpose() / squares;
+    noise_ -= descent_ * descent_.transpose() / count + descent_by_gray_ * descent_by_gray_.transpose() / squares;
+    tangent_.compute(tangent);
+}
+
+/// White noise of variance s^2 in what is left of the grays moves the parameters by covariance s^2 A^-1 B A^-T, A the tangent
+/// and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1.
+template <int Order> double SubsetMatcher<Order>::standard_error(double residual_variance) const {
+    const Square inverse = tangent_.inverse();
+    const auto variance = [&](int i) { return inverse.row(i).dot(inverse.row(i) * noise_); };
+    return std::sqrt(residual_variance * (variance(0) + variance(terms)) / 2);
 }
 
 template <int Order> bool SubsetMatcher<Order>::stays_inside(int x, int y, const Warp& warp) const {
@@ -279,7 +305,7 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
             gray += g;
             squared += g * g;
             by_reference += g * gray_[at];
-            Lanes gx = g * by_x_[at], gy = g * by_y_[at];
+            Lanes gx = g * smooth_by_x_[at], gy = g * smooth_by_y_[at];
             by_x[0] += gx;
             by_y[0] += gy;
             for (std::size_t a = 1; a <= Order; ++a) {
@@ -293,8 +319,8 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
         const std::array<float, 3> by_eta{1.0f, eta, eta * eta};
         for (std::size_t m = 0; m < terms; ++m) {
             const auto [a, b] = powers[m];
-            by_descent[m] += by_x[static_cast<std::size_t>(a)] * by_eta[static_cast<std::size_t>(b)];
-            by_descent[terms + m] += by_y[static_cast<std::size_t>(a)] * by_eta[static_cast<std::size_t>(b)];
+            by_descent[m] += by_x[a] * by_eta[b];
+            by_descent[terms + m] += by_y[a] * by_eta[b];
         }
     }
     Sums sums{static_cast<double>(gray.sum()), static_cast<double>(squared.sum()), static_cast<double>(by_reference.sum()), {}};
@@ -309,7 +335,7 @@ template <int Order> SubsetMatch SubsetMatcher<Order>::match(int x, int y, const
         found.status = PointStatus::no_contrast;
         return found;
     }
-    make_hessian();
+    make_matrices();
     found.warp = guess;
     const double count = (2 * half_ + 1) * (2 * half_ + 1);
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
@@ -324,10 +350,10 @@ template <int Order> SubsetMatch SubsetMatcher<Order>::match(int x, int y, const
             found.status = PointStatus::no_contrast;
             return found;
         }
-        found.zncc = sums.by_reference / (norm_ * norm);
-        // Pan et al. (2013) eq. 7, with the sums over the image's gray taken apart.
+        found.zncc = std::min(1.0, sums.by_reference / (norm_ * norm));  // rounding may pass 1
+        // Pan et al. (2013) eq. 7 with smooth descents, and the sums over the image's gray taken apart.
         const Parameters slope = descent_by_gray_ - norm_ / norm * (sums.by_descent - mean * descent_);
-        const Parameters step = -hessian_.solve(slope);
+        const Parameters step = -tangent_.solve(slope);
         if (!step.allFinite() || step.template lpNorm<Eigen::Infinity>() > half_)
             return found;
         Warp update;
@@ -335,9 +361,9 @@ template <int Order> SubsetMatch SubsetMatcher<Order>::match(int x, int y, const
         std::copy_n(step.data() + terms, terms, update.v.begin());
         compose_inverse<Order>(found.warp, update, half_);
         if (step.template lpNorm<Eigen::Infinity>() < settled) {
-            const double residual = 2 * norm_ * norm_ * (1 - found.zncc) / (count - 2 * terms - 2);
-            const Square inverse = hessian_.inverse();
-            found.sigma = std::sqrt(std::max(0.0, residual * (inverse(0, 0) + inverse(terms, terms)) / 2));
+            found.residual = 2 * norm_ * norm_ * (1 - found.zncc) / (count - 2 * terms - 2);
+            found.slope = slope_;
+            found.sigma = standard_error(found.residual);
             found.status = found.zncc < least_zncc ? PointStatus::low_correlation : PointStatus::ok;
             return found;
         }

@@ -21,24 +21,35 @@ struct Warp {
 
 /// The reference picture, made ready to take subsets from.
 struct ReferencePicture {
-    explicit ReferencePicture(FinePicture fine);
+    /// `smoothing` is the radius (standard deviation) of a Gaussian, 0 for none [px].
+    ReferencePicture(FinePicture fine, double smoothing);
 
     FinePicture picture;
     SplinePicture::Slopes slopes;
+    SplinePicture::Slopes smooth_slopes;  // of the smoothed picture
 };
 
 /// What was found for a subset. `status` is ok, no_contrast, no_convergence, left_picture or low_correlation.
 struct SubsetMatch {
     PointStatus status = PointStatus::no_convergence;
     Warp warp;
-    double zncc = 0;   // zero-normalised correlation coefficient
-    double sigma = 0;  // standard error of u[0] and v[0] (root mean square of the two), were the residual white noise [px]
+    double zncc = 0;      // zero-normalised correlation coefficient
+    double residual = 0;  // variance of what is left of the grays [gray^2]
+    double slope = 0;     // mean square of the reference's slope along x or y, fine details left out [gray^2/px^2]
+    double sigma = 0;  // standard error of u[0] and v[0] (root mean square of the two), by the noise of the pictures [px]
 };
 
 /// Follows a square subset of the reference into an image by inverse-compositional Gauss-Newton: Pan, Li and Tong (2013) for
 /// the first order, Gao et al. (2015) for the second. What is made small is the sum over the subset of
 /// ((f - mean f) / |f - mean f| - (g - mean g) / |g - mean g|)^2, f the gray of the reference and g that of the image at the
 /// warped place (ZNSSD). It holds its working memory: one for each thread.
+///
+/// Where the derivative of that sum vanishes, the slopes of f are at right angles to what is left of the grays. Ours differs:
+/// the slopes of the smoothed f are. Coarse features so weigh more than the finest, which cameras get wrong: a picture that was
+/// resampled by linear interpolation (as raw colour mosaics and rectified pictures are) at a fraction t of a pixel shows details of
+/// wave length L moved by about t (1 - t) (1 - 2 t) / 6 (2 pi / L)^2 px more than the rest. To smooth both pictures does the same
+/// for translations (Pan 2013, "Bias error reduction of digital image correlation using Gaussian pre-filtering"), but not where
+/// one of them is stretched, and it mixes the two faces of a crack.
 template <int Order> class SubsetMatcher {
   public:
     /// `subset` is odd. The pictures must outlive the matcher.
@@ -65,7 +76,8 @@ template <int Order> class SubsetMatcher {
     };
 
     bool take_subset(int x, int y);
-    void make_hessian();
+    void make_matrices();
+    double standard_error(double residual_variance) const;
     bool stays_inside(int x, int y, const Warp& warp) const;
     void sample_row(int x, int y, const Warp& warp, int row);
     Sums sample(int x, int y, const Warp& warp);
@@ -77,14 +89,16 @@ template <int Order> class SubsetMatcher {
     std::vector<Lanes> xi_;          // [blocks]
     std::vector<Lanes> inside_;      // [blocks] 1 in the subset, 0 beyond its edge
     std::vector<Lanes> gray_;        // reference, less its mean [rows x blocks]
-    std::vector<Lanes> by_x_;        // slopes of the reference [rows x blocks]
-    std::vector<Lanes> by_y_;
-    std::vector<float> place_x_, place_y_, sampled_;  // of one row
+    std::vector<Lanes> by_x_, by_y_;                // slopes of the reference [rows x blocks]
+    std::vector<Lanes> smooth_by_x_, smooth_by_y_;  // of the smoothed reference [rows x blocks]
+    std::vector<float> sampled_;     // gray of the image at the warped places of one row
     double mean_ = 0;                // of the reference's gray
     double norm_ = 0;                // root of the sum of squares of `gray_`
-    Parameters descent_;             // sum of the steepest descents
-    Parameters descent_by_gray_;     // sum of the steepest descents times `gray_`
-    Eigen::PartialPivLU<Square> hessian_;
+    double slope_ = 0;               // mean square of the reference's slope along x or y [gray^2/px^2]
+    Parameters descent_;             // sum of the smooth steepest descents
+    Parameters descent_by_gray_;     // sum of the smooth steepest descents times `gray_`
+    Eigen::PartialPivLU<Square> tangent_;  // smooth steepest descents by steepest descents
+    Square noise_;                         // smooth steepest descents by themselves
 };
 
 extern template class SubsetMatcher<1>;
