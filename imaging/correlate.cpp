@@ -5,6 +5,7 @@
 #include "imaging/strain.hpp"
 
 #include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <limits>
@@ -25,18 +26,42 @@ PointLattice lattice_of(const FinePicture& picture, const CorrelateOptions& opti
     return {columns, rows, first_x, first_y, options.step};
 }
 
-/// Number of left-out pixels above and to the left of each corner of a pixel [(rows + 1) x (columns + 1)].
-std::vector<int> count_masked(const std::vector<std::uint8_t>& mask, int columns, int rows) {
-    const std::size_t stride = static_cast<std::size_t>(columns) + 1;
-    std::vector<int> above(stride * (static_cast<std::size_t>(rows) + 1), 0);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(rows); ++y) {
-        int in_row = 0;
-        for (std::size_t x = 0; x + 1 < stride; ++x) {
-            in_row += mask[y * (stride - 1) + x] == 0 ? 1 : 0;
-            above[(y + 1) * stride + x + 1] = above[y * stride + x + 1] + in_row;
-        }
+/// Sums over the subsets of a picture, by its summed-area table.
+class SubsetSums {
+  public:
+    SubsetSums(const cv::Mat& picture, int half) : half_(half) { cv::integral(picture, table_, CV_64F); }
+
+    double about(int x, int y) const {
+        const int left = x - half_, right = x + half_ + 1, top = y - half_, bottom = y + half_ + 1;
+        return table_.at<double>(bottom, right) - table_.at<double>(bottom, left) - table_.at<double>(top, right) +
+               table_.at<double>(top, left);
     }
-    return above;
+
+  private:
+    int half_;
+    cv::Mat table_;
+};
+
+/// Which points cannot be followed in any image, and why; the others are not reached yet.
+std::vector<PointStatus> usable_points(const FinePicture& picture, const std::vector<std::uint8_t>& mask, const PointLattice& lattice,
+                                       int subset) {
+    const cv::Mat gray(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
+    const SubsetSums sum(gray, subset / 2), squares(gray.mul(gray), subset / 2);
+    const cv::Mat inside = mask.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
+                                        : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
+    const SubsetSums masked(inside == 0, subset / 2);
+    const double count = subset * subset;
+    std::vector<PointStatus> usable;
+    for (int point = 0; point < lattice.count(); ++point) {
+        const int x = lattice.x(point), y = lattice.y(point);
+        const double mean = sum.about(x, y) / count;
+        const bool flat = squares.about(x, y) / count - mean * mean < least_deviation * least_deviation;
+        usable.push_back(inside.at<std::uint8_t>(y, x) == 0 ? PointStatus::masked
+                         : masked.about(x, y) > 0           ? PointStatus::across_mask
+                         : flat                             ? PointStatus::no_contrast
+                                                            : PointStatus::not_reached);
+    }
+    return usable;
 }
 
 void require_contrast(const FinePicture& picture, const std::string& name) {
@@ -94,23 +119,8 @@ void CorrelateOptions::validate() const {
 Correlator::Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
                        const std::string& name)
     : options_(options), reference_(checked(std::move(reference), options, name), options.smoothing),
-      lattice_(lattice_of(reference_.picture, options)) {
-    const FinePicture& picture = reference_.picture;
-    at_start_.assign(static_cast<std::size_t>(lattice_.count()), PointStatus::not_reached);
-    if (mask.empty())
-        return;
-    const std::vector<int> masked = count_masked(mask, picture.columns, picture.rows);
-    const auto count = [&](int x, int y) { return masked[static_cast<std::size_t>(y) * (static_cast<std::size_t>(picture.columns) + 1) + static_cast<std::size_t>(x)]; };
-    const int half = options.subset / 2;
-    for (int point = 0; point < lattice_.count(); ++point) {
-        const int x = lattice_.x(point), y = lattice_.y(point);
-        PointStatus& status = at_start_[static_cast<std::size_t>(point)];
-        if (mask[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.columns) + static_cast<std::size_t>(x)] == 0)
-            status = PointStatus::masked;
-        else if (count(x + half + 1, y + half + 1) - count(x - half, y + half + 1) - count(x + half + 1, y - half) + count(x - half, y - half) > 0)
-            status = PointStatus::across_mask;
-    }
-}
+      lattice_(lattice_of(reference_.picture, options)),
+      at_start_(usable_points(reference_.picture, mask, lattice_, options.subset)) {}
 
 void Correlator::check(const FinePicture& image, const std::string& name) const {
     const FinePicture& reference = reference_.picture;

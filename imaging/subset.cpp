@@ -8,7 +8,6 @@
 namespace crampfit {
 namespace {
 
-constexpr double least_deviation = 0.5;    // of gray in a subset: rounding to whole grays alone gives 0.29
 constexpr double least_zncc = 0.8;
 constexpr int most_iterations = 30;
 constexpr double settled = 5e-4;           // last step anywhere at the subset's edge [px]: what is left is a tenth of it

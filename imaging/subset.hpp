@@ -29,6 +29,9 @@ struct ReferencePicture {
     SplinePicture::Slopes smooth_slopes;  // of the smoothed picture
 };
 
+/// Subsets whose gray has a smaller standard deviation are flat: rounding to whole grays alone gives 0.29.
+inline constexpr double least_deviation = 0.5;  // [gray]
+
 /// What was found for a subset. `status` is ok, no_contrast, no_convergence, left_picture or low_correlation.
 struct SubsetMatch {
     PointStatus status = PointStatus::no_convergence;
