@@ -24,7 +24,8 @@ struct PictureSeries {
 /// Adds them to a verb's command line; `file_kind` is shown for the output, such as FIELD.h5.
 void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string& file_kind);
 
-/// Throws InputError unless the results can be saved without harm to the pictures, options are right and --set is not there.
+/// Throws InputError unless the results can be saved without harm to the pictures, options are right and --set is not
+/// there.
 void check_series(const PictureSeries& series, const CommonOptions& common);
 
 /// Edge of a pixel, where it was told [m]. Throws InputError for one that is no length or not positive.
@@ -33,8 +34,8 @@ std::optional<double> pixel_of(const PictureSeries& series);
 FinePicture read_reference(const PictureSeries& series);
 FinePicture read_image(const PictureSeries& series, int image);
 
-/// Reads reference and mask, and looks at every image: a bad one among many is found before hours are spent on the others.
-/// Throws InputError.
+/// Reads reference and mask, and looks at every image: a bad one among many is found before hours are spent on the
+/// others. Throws InputError.
 Correlator make_correlator(const PictureSeries& series, const CommonOptions& common);
 
 /// The images' files, as they were named.

@@ -27,8 +27,9 @@ struct Arguments {
 std::vector<double> read_times(const std::filesystem::path& file, std::size_t images) {
     const std::vector<double> times = read_curves(file).time;
     if (times.size() != images)
-        throw InputError(file.string(), "time", fmt::format("{} rows", times.size()),
-                         fmt::format("needs a column time [s] with a row for each of the {} images, in their order", images));
+        throw InputError(
+            file.string(), "time", fmt::format("{} rows", times.size()),
+            fmt::format("needs a column time [s] with a row for each of the {} images, in their order", images));
     for (std::size_t i = 0; i < times.size(); ++i)
         if (std::isnan(times[i]) || (i > 0 && times[i] < times[i - 1]))
             throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", times[i]),
@@ -46,7 +47,8 @@ CrackTrack start_track(const Arguments& arguments) {
         track.time = read_times(arguments.times, track.images.size());
     if (!arguments.load.empty()) {
         if (track.time.empty())
-            throw InputError("command line", "--load", arguments.load.string(), "needs --times, the images' times on the load's clock");
+            throw InputError("command line", "--load", arguments.load.string(),
+                             "needs --times, the images' times on the load's clock");
         add_load(track, read_curves(arguments.load), arguments.load);
     }
     return track;
@@ -79,8 +81,9 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
     write(track, pictures.output);
     if (!pictures.preview.empty() && done > 0)
         draw_track(read_image(pictures, done - 1), track.tips, pictures.preview);
-    report(common, fmt::format("tip found in {} of {} images, saved as {}", std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status),
-                               done, pictures.output.string()));
+    report(common, fmt::format("tip found in {} of {} images, saved as {}",
+                               std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status), done,
+                               pictures.output.string()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 
@@ -90,8 +93,10 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
     CLI::App* verb = command.add_subcommand("track", "Crack tip and crack length from pictures");
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
-    verb->add_option("--times", arguments->times, "Table with the column time [s], a row an image")->type_name("TIMES.csv");
-    verb->add_option("--load", arguments->load, "Table with time [s] on the same clock and displacement [mm], force [N] or both")
+    verb->add_option("--times", arguments->times, "Table with the column time [s], a row an image")
+        ->type_name("TIMES.csv");
+    verb->add_option("--load", arguments->load,
+                     "Table with time [s] on the same clock and displacement [mm], force [N] or both")
         ->type_name("LOAD.csv");
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};
 }

@@ -15,7 +15,8 @@ using hdf5::Group;
 
 namespace {
 
-constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack", "tip outside the picture"};
+constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack",
+                                                                 "tip outside the picture"};
 
 struct TipColumn {
     const char* name;
@@ -59,7 +60,8 @@ const char* name(TipStatus status) { return status_names.at(static_cast<std::siz
 
 void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file) {
     if (load.time.empty())
-        throw InputError(file.string(), "time", "no such column", "the load needs its time, on the clock of the images");
+        throw InputError(file.string(), "time", "no such column",
+                         "the load needs its time, on the clock of the images");
     if (load.displacement.empty() && load.force.empty())
         throw InputError(file.string(), "", "", "needs a column displacement or force beside the time");
     for (std::size_t i = 0; i < load.time.size(); ++i)
@@ -100,7 +102,9 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
             tips.push_back(tip.tip);
         }
         root.write("status", status, {"1", "index into `status names`; 0 is a tip that was found"});
-        root.write("tip", tips, {"px", "x right, y down, from the centre of the first pixel, at the material's place in the reference"});
+        root.write(
+            "tip", tips,
+            {"px", "x right, y down, from the centre of the first pixel, at the material's place in the reference"});
         for (const TipColumn& column : tip_columns) {
             std::vector<double> values;
             for (const CrackTip& tip : track.tips)

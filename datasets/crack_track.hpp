@@ -25,7 +25,8 @@ inline constexpr std::size_t tip_status_count = 4;
 /// In words, as the table `series` prints it.
 const char* name(TipStatus status);
 
-/// The tip of a crack in one image, at the place that its material has in the reference. Numbers are not a number unless `ok`.
+/// The tip of a crack in one image, at the place that its material has in the reference. Numbers are not a number
+/// unless `ok`.
 struct CrackTip {
     static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
     TipStatus status = TipStatus::no_crack;
@@ -39,15 +40,15 @@ struct CrackTip {
 struct CrackTrack {
     std::string reference;
     std::vector<std::string> images;
-    std::optional<double> pixel;  // edge of a pixel, where it was told [m]
-    std::vector<CrackTip> tips;   // of each image
+    std::optional<double> pixel;       // edge of a pixel, where it was told [m]
+    std::vector<CrackTip> tips;        // of each image
     std::vector<double> time;          // of each image, or empty [s]
     std::vector<double> displacement;  // of the loading then, or empty [m]; not a number outside the load's record
     std::vector<double> force;         // of the loading then, or empty [N]; likewise
 };
 
-/// Displacement and force at the images' times, from the curves of a test on the same clock, linearly between its rows. Throws
-/// InputError, naming `file`, for curves without a time that rises or without anything beside it.
+/// Displacement and force at the images' times, from the curves of a test on the same clock, linearly between its rows.
+/// Throws InputError, naming `file`, for curves without a time that rises or without anything beside it.
 void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file);
 
 /// What a fit takes as an experiment's data: time, displacement, force and crack length as far as they are known.

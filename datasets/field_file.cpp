@@ -10,8 +10,9 @@ using hdf5::Group;
 namespace {
 
 constexpr std::array<const char*, point_status_count> status_names{
-    "ok",          "masked",         "across the mask",  "no contrast", "not reached", "no convergence",
-    "left the picture", "low correlation", "moved apart"};
+    "ok",          "masked",         "across the mask",  "no contrast",
+    "not reached", "no convergence", "left the picture", "low correlation",
+    "moved apart"};
 
 struct FieldColumn {
     const char* name;
@@ -65,7 +66,8 @@ void write_field(Group& images, int image, const PointLattice& lattice, const Di
     std::vector<std::uint8_t> status;
     for (const PointStatus one : field.status)
         status.push_back(static_cast<std::uint8_t>(one));
-    group.write("status", status, shape_of(lattice), {"1", "index into `status names`; 0 is a point that was followed"});
+    group.write("status", status, shape_of(lattice),
+                {"1", "index into `status names`; 0 is a point that was followed"});
 }
 
 DisplacementField read_field(const Group& group, const PointLattice& lattice) {

@@ -189,8 +189,9 @@ void print_points(const std::filesystem::path& file, std::ostream& out) {
     read_fields(file, [&](const FieldSeries& series, int image, const DisplacementField& field) {
         for (int point = 0; point < series.lattice.count(); ++point) {
             const auto i = static_cast<std::size_t>(point);
-            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point), series.lattice.y(point), field.u[i],
-                       field.v[i], field.exx[i], field.eyy[i], field.exy[i], field.zncc[i], field.sigma[i], name(field.status[i]));
+            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point),
+                       series.lattice.y(point), field.u[i], field.v[i], field.exx[i], field.eyy[i], field.exy[i],
+                       field.zncc[i], field.sigma[i], name(field.status[i]));
         }
     });
 }
@@ -268,7 +269,8 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
         print_points(file, out);
     } else if (kind == "field") {
         const FieldSeries series = read_field_series(file);
-        print_one_of({{"points", {}}, {"images", [&] { return image_table(series.reference, series.images); }}}, file, table, out);
+        const auto images = [&] { return image_table(series.reference, series.images); };
+        print_one_of({{"points", {}}, {"images", images}}, file, table, out);
     } else if (kind == "track") {
         const CrackTrack track = read_crack_track(file);
         print_one_of(offers(track), file, table, out);

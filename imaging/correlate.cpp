@@ -13,7 +13,8 @@
 namespace crampfit {
 namespace {
 
-constexpr int border = 6;  // pixels from the outermost subsets to the picture's edge: room for smoothing and small displacements
+constexpr int border =
+    6;  // pixels from the outermost subsets to the picture's edge: room for smoothing and small displacements
 
 /// As many points as there is room for, with what is left over shared between both sides.
 PointLattice lattice_of(const FinePicture& picture, const CorrelateOptions& options) {
@@ -43,12 +44,13 @@ class SubsetSums {
 };
 
 /// Which points cannot be followed in any image, and why; the others are not reached yet.
-std::vector<PointStatus> usable_points(const FinePicture& picture, const std::vector<std::uint8_t>& mask, const PointLattice& lattice,
-                                       int subset) {
+std::vector<PointStatus> usable_points(const FinePicture& picture, const std::vector<std::uint8_t>& mask,
+                                       const PointLattice& lattice, int subset) {
     const cv::Mat gray(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
     const SubsetSums sum(gray, subset / 2), squares(gray.mul(gray), subset / 2);
-    const cv::Mat inside = mask.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
-                                        : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
+    const cv::Mat inside = mask.empty()
+                               ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
+                               : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
     const SubsetSums masked(inside == 0, subset / 2);
     const double count = subset * subset;
     std::vector<PointStatus> usable;
@@ -67,23 +69,24 @@ std::vector<PointStatus> usable_points(const FinePicture& picture, const std::ve
 void require_contrast(const FinePicture& picture, const std::string& name) {
     const auto [least, most] = std::ranges::minmax_element(picture.gray);
     if (*least == *most)
-        throw InputError("command line", "picture", name, fmt::format("has gray {} only: there is nothing to follow", *least));
+        throw InputError("command line", "picture", name,
+                         fmt::format("has gray {} only: there is nothing to follow", *least));
 }
 
 /// A reference that can be followed.
 FinePicture checked(FinePicture picture, const CorrelateOptions& options, const std::string& name) {
     if (const int least = options.subset + 2 * border; picture.columns < least || picture.rows < least)
         throw InputError("command line", "reference", name,
-                         fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns, picture.rows,
-                                     options.subset, least, least));
+                         fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns,
+                                     picture.rows, options.subset, least, least));
     require_contrast(picture, name);
     return picture;
 }
 
 constexpr double most_apart = 0.1;  // root mean square over a subset of motion that its warp does not follow [px]
 
-/// A subset that reaches over a crack matches neither side, and yet may correlate well. It shows in what is left of its grays:
-/// more than noise leaves elsewhere in the picture, and as much as motion by `most_apart` makes of the slopes.
+/// A subset that reaches over a crack matches neither side, and yet may correlate well. It shows in what is left of its
+/// grays: more than noise leaves elsewhere in the picture, and as much as motion by `most_apart` makes of the slopes.
 void drop_torn(std::vector<SubsetMatch>& matches) {
     std::vector<double> residuals;
     for (const SubsetMatch& match : matches)
@@ -126,8 +129,8 @@ void Correlator::check(const FinePicture& image, const std::string& name) const 
     const FinePicture& reference = reference_.picture;
     if (image.columns != reference.columns || image.rows != reference.rows)
         throw InputError("command line", "image", name,
-                         fmt::format("is {} x {} pixels, the reference {} x {}: all must have one size", image.columns, image.rows,
-                                     reference.columns, reference.rows));
+                         fmt::format("is {} x {} pixels, the reference {} x {}: all must have one size", image.columns,
+                                     image.rows, reference.columns, reference.rows));
     require_contrast(image, name);
 }
 

@@ -9,24 +9,25 @@
 namespace crampfit {
 
 struct CorrelateOptions {
-    int subset = 31;        // edge of a subset, odd [px]
-    int step = 10;          // between points [px]
-    int order = 1;          // of the warp within a subset: 1 or 2
-    double smoothing = 2.5; // radius of the Gaussian that smooths the reference's slopes, 0 for none (subset.hpp) [px]
+    int subset = 31;         // edge of a subset, odd [px]
+    int step = 10;           // between points [px]
+    int order = 1;           // of the warp within a subset: 1 or 2
+    double smoothing = 2.5;  // radius of the Gaussian that smooths the reference's slopes, 0 for none (subset.hpp) [px]
     int threads = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.
     void validate() const;
 };
 
-/// Displacement fields of images against one reference, by digital image correlation: each image is worked on by itself, and
-/// the same pictures give the same bits for any number of threads.
+/// Displacement fields of images against one reference, by digital image correlation: each image is worked on by
+/// itself, and the same pictures give the same bits for any number of threads.
 class Correlator {
   public:
-    /// `mask` is empty or, a pixel of the reference each, 0 where nothing is to be followed: no subset reaches over such a pixel.
-    /// Options must be valid; `name` is what errors call the reference. Throws InputError for a reference that is smaller than
-    /// one subset with a border, or has one gray only.
-    Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options, const std::string& name);
+    /// `mask` is empty or, a pixel of the reference each, 0 where nothing is to be followed: no subset reaches over
+    /// such a pixel. Options must be valid; `name` is what errors call the reference. Throws InputError for a reference
+    /// that is smaller than one subset with a border, or has one gray only.
+    Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
+               const std::string& name);
 
     const PointLattice& lattice() const { return lattice_; }
 

@@ -4,26 +4,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 namespace crampfit {
 namespace {
 
-constexpr int terms = 14;            // of the series, for each component
-constexpr int smooth_terms = 10;     // of a polynomial of third degree
-constexpr double unit = 100;         // length that r is counted in, so that the terms are of like size [px]
-constexpr int scan_points = 500;     // of the field that take part in the coarse search
-constexpr int scan_places = 13;      // along the longer side of the field
-constexpr int scan_angles = 16;      // around the circle
-constexpr int ring_subsets = 6;      // outer radius of the ring about the tip, in subsets
-constexpr int least_points = 60;     // four times the series' coefficients
-// Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields without a
-// crack reach some 10.
+constexpr int terms = 14;         // of the series, for each component
+constexpr int smooth_terms = 10;  // of a polynomial of third degree
+constexpr double unit = 100;      // length that r is counted in, so that the terms are of like size [px]
+constexpr int scan_points = 500;  // of the field that take part in the coarse search
+constexpr int scan_places = 13;   // along the longer side of the field
+constexpr int scan_angles = 16;   // around the circle
+constexpr int ring_subsets = 6;   // outer radius of the ring about the tip, in subsets
+constexpr int least_points = 60;  // four times the series' coefficients
+// Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
+// without a crack reach some 10.
 constexpr double least_gain = 50;
-
 
 // Of the search for the tip.
 constexpr int most_iterations = 40;
@@ -31,7 +30,7 @@ constexpr double difference_step = 0.1;  // [px]
 constexpr double longest_step = 30;      // [px]
 constexpr double settled = 1e-3;         // [px]
 constexpr double most_damping = 1e8;
-constexpr double as_good = 1.1;          // a score by that factor above the best may be chance
+constexpr double as_good = 1.1;  // a score by that factor above the best may be chance
 
 using Term = Eigen::RowVector<double, terms>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, terms>;
@@ -61,11 +60,24 @@ Term series(const Vec2& place) {
         return Term::Zero();
     // cos and sin of theta, theta / 2 and 3 theta / 2 without an angle: half angles by their squares, others by sums.
     const double c = place.x() / (r * unit), s = place.y() / (r * unit);
-    const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)), sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
+    const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)),
+                 sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
     const double c3 = c * ch - s * sh, s3 = s * ch + c * sh;
     const double root = std::sqrt(r), root3 = r * root;
-    return {1,          root * ch,  root * sh,  root * c3, root * s3,         r * c,            r * s,
-            root3 * c3, root3 * s3, root3 * ch, root3 * sh, r * r,  r * r * (c * c - s * s), 2 * r * r * c * s};
+    return {1,
+            root * ch,
+            root * sh,
+            root * c3,
+            root * s3,
+            r * c,
+            r * s,
+            root3 * c3,
+            root3 * s3,
+            root3 * ch,
+            root3 * sh,
+            r * r,
+            r * r * (c * c - s * s),
+            2 * r * r * c * s};
 }
 
 /// Half the width of the strip about a crack in which subsets reach over it [px].
@@ -74,11 +86,14 @@ double clearance(int subset, double angle) {
 }
 
 /// Whether a subset reaches over the crack or its tip; `local` is its place from the tip.
-bool reaches_over(const Vec2& local, double width) { return local.norm() < width || (local.x() < 0 && std::abs(local.y()) < width); }
+bool reaches_over(const Vec2& local, double width) {
+    return local.norm() < width || (local.x() < 0 && std::abs(local.y()) < width);
+}
 
 std::vector<Sample> within(const std::vector<Sample>& samples, const Vec2& tip, double radius) {
     std::vector<Sample> near;
-    std::ranges::copy_if(samples, std::back_inserter(near), [&](const Sample& sample) { return (sample.place - tip).norm() < radius; });
+    std::ranges::copy_if(samples, std::back_inserter(near),
+                         [&](const Sample& sample) { return (sample.place - tip).norm() < radius; });
     return near;
 }
 
@@ -103,8 +118,8 @@ Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
     return right - rows * rows.householderQr().solve(right);
 }
 
-/// Mean square of what is left, for each degree of freedom [px^2]; by normal equations, quick and exact enough to compare.
-/// Points nearer to the tip than `about_tip` and to the crack than `about_crack` take no part [px].
+/// Mean square of what is left, for each degree of freedom [px^2]; by normal equations, quick and exact enough to
+/// compare. Points nearer to the tip than `about_tip` and to the crack than `about_crack` take no part [px].
 double scan_score(const std::vector<Sample>& samples, const Line& line, double about_tip, double about_crack) {
     Eigen::Matrix<double, terms, terms> normal = Eigen::Matrix<double, terms, terms>::Zero();
     Eigen::Matrix<double, terms, 2> right = Eigen::Matrix<double, terms, 2>::Zero();
@@ -157,14 +172,16 @@ Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subse
     return best;
 }
 
-/// Turns the line to where the points beside it agree best. The series as a whole is the same for any direction, but a point
-/// on the wrong side of the crack is not. Here subsets that reach over the crack take part, so that no direction can hide such
-/// points in a strip; the direction is the middle of those that are about as good as the best, as no point may lie between them.
+/// Turns the line to where the points beside it agree best. The series as a whole is the same for any direction, but a
+/// point on the wrong side of the crack is not. Here subsets that reach over the crack take part, so that no direction
+/// can hide such points in a strip; the direction is the middle of those that are about as good as the best, as no
+/// point may lie between them.
 void turn(const std::vector<Sample>& samples, Line& line, int subset, double range, double step) {
     const int count = static_cast<int>(std::lround(2 * range / step)) + 1;
     std::vector<double> scores;
     for (int i = 0; i < count; ++i)
-        scores.push_back(scan_score(samples, {line.tip, line.angle - range + i * step}, clearance(subset, line.angle), 0));
+        scores.push_back(
+            scan_score(samples, {line.tip, line.angle - range + i * step}, clearance(subset, line.angle), 0));
     const auto best = static_cast<int>(std::ranges::min_element(scores) - scores.begin());
     const double good = as_good * scores[static_cast<std::size_t>(best)];
     int first = best, last = best;
@@ -175,10 +192,12 @@ void turn(const std::vector<Sample>& samples, Line& line, int subset, double ran
     line.angle += (first + last) * step / 2 - range;
 }
 
-/// Levenberg-Marquardt over the tip, the coefficients of the series eliminated (variable projection, Golub and Pereyra 1973),
-/// derivatives by central differences. Gives the tip's covariance, were the displacements independent [px^2].
+/// Levenberg-Marquardt over the tip, the coefficients of the series eliminated (variable projection, Golub and Pereyra
+/// 1973), derivatives by central differences. Gives the tip's covariance, were the displacements independent [px^2].
 Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
-    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd { return residuals(samples, {tip, line.angle}).reshaped(); };
+    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd {
+        return residuals(samples, {tip, line.angle}).reshaped();
+    };
     Eigen::VectorXd now = left(line.tip);
     double damping = 1e-3;
     Eigen::Matrix2d normal;
@@ -252,18 +271,21 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
 
     Line line = scan(samples, lattice, geometry.subset);
     Eigen::Matrix2d covariance;
-    // The points that take part depend on the line, and the line on them: a few rounds, first over all, then over the ring.
+    // The points that take part depend on the line, and the line on them: a few rounds, first over all, then over the
+    // ring.
     constexpr double everywhere = std::numeric_limits<double>::infinity();
     const double ring = ring_subsets * geometry.subset;
     constexpr double degree = std::numbers::pi / 180;
-    for (const auto& [radius, range] : {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
+    for (const auto& [radius, range] :
+         {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
         turn(within(samples, line.tip, radius), line, geometry.subset, range, range / 12);
         const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, geometry.subset);
         if (static_cast<int>(clear.size()) < least_points)
             return found;
         covariance = refine(clear, line);
     }
-    const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 && line.tip.y() <= geometry.rows - 1;
+    const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 &&
+                        line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
     if (static_cast<int>(clear.size()) < least_points)
         return found;

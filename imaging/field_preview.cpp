@@ -25,7 +25,8 @@ Range range_of(const std::vector<double>& values) {
     Range range{1, 0};
     for (const double value : values)
         if (!std::isnan(value))
-            range = range.low > range.high ? Range{value, value} : Range{std::min(range.low, value), std::max(range.high, value)};
+            range = range.low > range.high ? Range{value, value}
+                                           : Range{std::min(range.low, value), std::max(range.high, value)};
     return range;
 }
 
@@ -51,13 +52,16 @@ void draw_legend(cv::Mat& map, const cv::Mat& colours, const std::string& name, 
     cv::Mat bar;
     cv::resize(colours, bar, {map.cols - 20, 10}, 0, 0, cv::INTER_LINEAR);
     bar.copyTo(legend(cv::Rect(10, 4, bar.cols, bar.rows)));
-    const std::string text = range.low > range.high ? name + ": no point was followed"
-                                                    : fmt::format("{} from {:.4g} to {:.4g} px", name, range.low, range.high);
+    const std::string text = range.low > range.high
+                                 ? name + ": no point was followed"
+                                 : fmt::format("{} from {:.4g} to {:.4g} px", name, range.low, range.high);
     cv::putText(legend, text, {10, 31}, cv::FONT_HERSHEY_SIMPLEX, 0.45, {0, 0, 0}, 1, cv::LINE_AA);
 }
 
-cv::Mat draw_map(const FinePicture& reference, const PointLattice& lattice, const std::vector<double>& values, const std::string& name) {
-    cv::Mat map(reference.rows + legend_height, std::max(reference.columns, least_width), CV_8UC3, cv::Scalar::all(255));
+cv::Mat draw_map(const FinePicture& reference, const PointLattice& lattice, const std::vector<double>& values,
+                 const std::string& name) {
+    cv::Mat map(reference.rows + legend_height, std::max(reference.columns, least_width), CV_8UC3,
+                cv::Scalar::all(255));
     cv::Mat picture = map(cv::Rect(0, 0, reference.columns, reference.rows));
     faded(reference).copyTo(picture);
     const cv::Mat colours = colour_scale();
@@ -101,7 +105,9 @@ void draw_field(const FinePicture& reference, const PointLattice& lattice, const
 
 void draw_track(const FinePicture& image, const std::vector<CrackTip>& tips, const std::filesystem::path& file) {
     cv::Mat drawing = faded(image);
-    const auto pixel = [](const Vec2& place) { return cv::Point(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y()))); };
+    const auto pixel = [](const Vec2& place) {
+        return cv::Point(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y())));
+    };
     for (const CrackTip& tip : tips)
         if (tip.status == TipStatus::ok)
             cv::circle(drawing, pixel(tip.tip), 3, {200, 80, 0}, 1, cv::LINE_AA);

@@ -6,8 +6,9 @@
 namespace crampfit {
 namespace {
 
-// Unser (1999), "Splines: a perfect fit for signal and image processing", box 2: the recursive filter that turns samples into
-// cubic B-spline coefficients, with mirror boundaries. Its gain of 6 in each direction is put onto the samples before.
+// Unser (1999), "Splines: a perfect fit for signal and image processing", box 2: the recursive filter that turns
+// samples into cubic B-spline coefficients, with mirror boundaries. Its gain of 6 in each direction is put onto the
+// samples before.
 const float pole = static_cast<float>(std::sqrt(3.0) - 2.0);
 constexpr float gain = 36.0f;
 constexpr int horizon = 16;  // pole^16 is below a float's last digit
@@ -51,7 +52,8 @@ SplinePicture::SplinePicture(const FinePicture& picture)
         std::transform(gray, gray + columns_, line, [](float value) { return gain * value; });
         filter(line, columns_, 1, 1);
     }
-    filter(coefficients_.data() + index(0, 0), rows_, static_cast<std::size_t>(stride_), static_cast<std::size_t>(columns_));
+    filter(coefficients_.data() + index(0, 0), rows_, static_cast<std::size_t>(stride_),
+           static_cast<std::size_t>(columns_));
     mirror_margins();
 }
 

@@ -6,8 +6,8 @@
 
 namespace crampfit {
 
-/// The bicubic B-spline that goes through every pixel of a picture. The picture goes on beyond its borders as its mirror image
-/// about the outermost pixels' centres.
+/// The bicubic B-spline that goes through every pixel of a picture. The picture goes on beyond its borders as its
+/// mirror image about the outermost pixels' centres.
 class SplinePicture {
   public:
     /// Works with rows that are read this far past a row's end.

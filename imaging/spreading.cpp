@@ -12,9 +12,10 @@
 namespace crampfit {
 namespace {
 
-constexpr std::size_t round_size = 256;  // points followed at once: some milliseconds of work
-constexpr int seed_every = 4;            // points of the lattice between those that may be sought in the whole image
-constexpr double seed_zncc = 0.5;        // at whole pixels; the match that is begun there must reach more
+constexpr std::size_t round_size = 256;    // points followed at once: some milliseconds of work
+constexpr int seed_every = 4;              // points of the lattice between those that may be sought in the whole image
+constexpr std::size_t most_searches = 64;  // in the whole image
+constexpr double seed_zncc = 0.5;          // at whole pixels; the match that is begun there must reach more
 
 struct Job {
     int point;
@@ -26,7 +27,8 @@ template <int Order> class Spreading {
   public:
     Spreading(const ReferencePicture& reference, const FinePicture& image, const PointLattice& lattice,
               const std::vector<PointStatus>& at_start, int subset, int threads)
-        : reference_(reference), image_(image), spline_(image), lattice_(lattice), half_(subset / 2), threads_(threads) {
+        : reference_(reference), image_(image), spline_(image), lattice_(lattice), half_(subset / 2),
+          threads_(threads) {
         for (const PointStatus status : at_start)
             matches_.emplace_back().status = status;
         chosen_.assign(at_start.size(), false);
@@ -35,42 +37,56 @@ template <int Order> class Spreading {
     }
 
     std::vector<SubsetMatch> run() {
-        for (const int seed : seeds()) {
-            if (matches_[index(seed)].status != PointStatus::not_reached)
-                continue;
-            if (const auto guess = search(seed)) {
-                jobs_ = {{seed, *guess, {}}};
-                spread();
-            }
-        }
+        const std::vector<int> all = seeds();
+        // The whole image is searched for some of the seeds at most; once one is found, others are sought near by.
+        const std::size_t every = (all.size() + most_searches - 1) / most_searches;
+        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every)
+            begin_from(all[i]);
+        for (std::size_t i = 0; i < all.size() && !nothing_found(); ++i)
+            begin_from(all[i]);
         return std::move(matches_);
     }
 
   private:
     static std::size_t index(int point) { return static_cast<std::size_t>(point); }
 
+    bool nothing_found() const { return low_u_ > high_u_; }
+
+    void begin_from(int seed) {
+        if (matches_[index(seed)].status != PointStatus::not_reached)
+            return;
+        if (const auto guess = search(seed)) {
+            jobs_ = {{seed, *guess, {}}};
+            spread();
+        }
+    }
+
     /// Points that may be sought, those nearest to the picture's middle first.
     std::vector<int> seeds() const {
         std::vector<int> points;
         for (int row = seed_every / 2; row < std::max(lattice_.rows, seed_every / 2 + 1); row += seed_every)
-            for (int column = seed_every / 2; column < std::max(lattice_.columns, seed_every / 2 + 1); column += seed_every)
-                points.push_back(std::min(row, lattice_.rows - 1) * lattice_.columns + std::min(column, lattice_.columns - 1));
+            for (int column = seed_every / 2; column < std::max(lattice_.columns, seed_every / 2 + 1);
+                 column += seed_every)
+                points.push_back(std::min(row, lattice_.rows - 1) * lattice_.columns +
+                                 std::min(column, lattice_.columns - 1));
         const auto from_middle = [&](int point) {
-            const int x = 2 * (point % lattice_.columns) - lattice_.columns, y = 2 * (point / lattice_.columns) - lattice_.rows;
+            const int x = 2 * (point % lattice_.columns) - lattice_.columns,
+                      y = 2 * (point / lattice_.columns) - lattice_.rows;
             return x * x + y * y;
         };
         std::ranges::stable_sort(points, {}, from_middle);
         return points;
     }
 
-    /// The place of the best correlation at whole pixels: in the whole image for the first seed, and for later ones in the
-    /// range of what was found and half as far again.
+    /// The place of the best correlation at whole pixels: in the whole image for the first seed, and for later ones in
+    /// the range of what was found and half as far again.
     std::optional<Warp> search(int point) const {
         const cv::Mat reference = as_matrix(reference_.picture), image = as_matrix(image_);
         const int x = lattice_.x(point), y = lattice_.y(point), subset = 2 * half_ + 1;
         const cv::Rect window = search_window(x, y);
         cv::Mat zncc;
-        cv::matchTemplate(image(window), reference(cv::Rect(x - half_, y - half_, subset, subset)), zncc, cv::TM_CCOEFF_NORMED);
+        cv::matchTemplate(image(window), reference(cv::Rect(x - half_, y - half_, subset, subset)), zncc,
+                          cv::TM_CCOEFF_NORMED);
         double best = 0;
         cv::Point place;
         cv::minMaxLoc(zncc, nullptr, &best, nullptr, &place);
@@ -84,7 +100,7 @@ template <int Order> class Spreading {
 
     cv::Rect search_window(int x, int y) const {
         const cv::Rect whole(0, 0, image_.columns, image_.rows);
-        if (low_u_ > high_u_)
+        if (nothing_found())
             return whole;
         const int margin = 2 * half_ + static_cast<int>(std::max(high_u_ - low_u_, high_v_ - low_v_) / 2);
         const cv::Point from(x + static_cast<int>(low_u_) - margin, y + static_cast<int>(low_v_) - margin);
@@ -103,7 +119,8 @@ template <int Order> class Spreading {
         std::atomic<std::size_t> next{0};
         const auto work = [&](std::size_t thread) {
             for (std::size_t i = next++; i < jobs_.size(); i = next++)
-                jobs_[i].match = matchers_[thread].match(lattice_.x(jobs_[i].point), lattice_.y(jobs_[i].point), jobs_[i].guess);
+                jobs_[i].match =
+                    matchers_[thread].match(lattice_.x(jobs_[i].point), lattice_.y(jobs_[i].point), jobs_[i].guess);
         };
         std::barrier round(threads_, [&]() noexcept {
             keep_results();
@@ -130,15 +147,17 @@ template <int Order> class Spreading {
             if (kept.status != PointStatus::ok)
                 continue;
             front_.push({kept.zncc, -job.point});
-            low_u_ = std::min(low_u_, kept.warp.u[0]);
-            high_u_ = std::max(high_u_, kept.warp.u[0]);
-            low_v_ = std::min(low_v_, kept.warp.v[0]);
-            high_v_ = std::max(high_v_, kept.warp.v[0]);
+            const double u = kept.warp.u[0], v = kept.warp.v[0];
+            const bool first = nothing_found();
+            low_u_ = first ? u : std::min(low_u_, u);
+            high_u_ = first ? u : std::max(high_u_, u);
+            low_v_ = first ? v : std::min(low_v_, v);
+            high_v_ = first ? v : std::max(high_v_, v);
         }
     }
 
-    /// Neighbours of the most reliable points that have not been followed. A point that was lost is tried anew from its other
-    /// neighbours, as long as there are any.
+    /// Neighbours of the most reliable points that have not been followed. A point that was lost is tried anew from its
+    /// other neighbours, as long as there are any.
     void choose_jobs() {
         jobs_.clear();
         while (!front_.empty() && jobs_.size() < round_size) {
@@ -185,16 +204,18 @@ template <int Order> class Spreading {
     int threads_;
     std::vector<SubsetMatcher<Order>> matchers_;  // one a thread
     std::vector<SubsetMatch> matches_;
-    std::vector<Job> jobs_;                                  // of the round
-    std::vector<bool> chosen_;                               // for the round
-    std::priority_queue<std::pair<double, int>> front_;      // ZNCC and number, negative, of points whose neighbours may be open
-    double low_u_ = 1, high_u_ = 0, low_v_ = 1, high_v_ = 0; // range of what was found [px]; empty at first
+    std::vector<Job> jobs_;     // of the round
+    std::vector<bool> chosen_;  // for the round
+    std::priority_queue<std::pair<double, int>>
+        front_;  // ZNCC and number, negative, of points whose neighbours may be open
+    double low_u_ = 1, high_u_ = 0, low_v_ = 1, high_v_ = 0;  // range of what was found [px]; empty at first
 };
 
 }  // namespace
 
-std::vector<SubsetMatch> spread_matches(const ReferencePicture& reference, const FinePicture& image, const PointLattice& lattice,
-                                        const std::vector<PointStatus>& at_start, int subset, int order, int threads) {
+std::vector<SubsetMatch> spread_matches(const ReferencePicture& reference, const FinePicture& image,
+                                        const PointLattice& lattice, const std::vector<PointStatus>& at_start,
+                                        int subset, int order, int threads) {
     if (order == 1)
         return Spreading<1>(reference, image, lattice, at_start, subset, threads).run();
     return Spreading<2>(reference, image, lattice, at_start, subset, threads).run();

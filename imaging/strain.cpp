@@ -22,7 +22,8 @@ int window_begin(int at, int count) { return std::clamp(at - reach, 0, std::max(
 std::vector<std::array<int, 2>> joined(const PointLattice& lattice, const DisplacementField& field, int point) {
     const int column = point % lattice.columns, row = point / lattice.columns;
     const int left = window_begin(column, lattice.columns) - column, top = window_begin(row, lattice.rows) - row;
-    const int right = std::min(left + edge, lattice.columns - column), bottom = std::min(top + edge, lattice.rows - row);
+    const int right = std::min(left + edge, lattice.columns - column),
+              bottom = std::min(top + edge, lattice.rows - row);
     std::array<bool, edge * edge> seen{};
     std::vector<std::array<int, 2>> places;
     const auto visit = [&](int dx, int dy) {
@@ -101,8 +102,8 @@ void add_strain(const PointLattice& lattice, DisplacementField& field) {
         if (field.status[at] != PointStatus::ok)
             continue;
         const std::optional<Slopes> slopes = window_is_whole(lattice, field, point)
-                                ? fit_whole_window(lattice, field, point)
-                                : fit(lattice, field, point, joined(lattice, field, point));
+                                                 ? fit_whole_window(lattice, field, point)
+                                                 : fit(lattice, field, point, joined(lattice, field, point));
         if (slopes) {
             field.exx[at] = (*slopes)(0, 0) / lattice.step;
             field.eyy[at] = (*slopes)(1, 1) / lattice.step;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double least_zncc = 0.8;
 constexpr int most_iterations = 30;
-constexpr double settled = 5e-4;           // last step anywhere at the subset's edge [px]: what is left is a tenth of it
+constexpr double settled = 5e-4;  // last step anywhere at the subset's edge [px]: what is left is a tenth of it
 
 /// Powers of xi and eta in the terms of a warp.
 constexpr std::array<std::array<std::size_t, 2>, 6> powers{{{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}};
@@ -22,7 +22,8 @@ template <class Lanes, std::size_t Count> void clear(std::array<Lanes, Count>& s
 
 /// Adds each of `values` times 1, xi, xi^2, ... to its sums.
 template <class Lanes, std::size_t Count, std::size_t Kinds>
-void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lanes& xi, std::array<Lanes, Kinds> values) {
+void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lanes& xi,
+                   std::array<Lanes, Kinds> values) {
     for (std::size_t power = 0; power < Count; ++power)
         for (std::size_t kind = 0; kind < Kinds; ++kind) {
             sums[kind][power] += values[kind];
@@ -30,9 +31,9 @@ void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lane
         }
 }
 
-/// The warp as a matrix that acts on monomials of the place in the subset, so that one warp after another is a product: on
-/// (xi, eta, 1) for the first order, Pan et al. (2013) eq. 9; on (xi^2, xi eta, eta^2, xi, eta, 1), less what is of higher
-/// order, for the second, Gao et al. (2015) eq. 12. `half` is that of the subset, whose edges are at 1 here.
+/// The warp as a matrix that acts on monomials of the place in the subset, so that one warp after another is a product:
+/// on (xi, eta, 1) for the first order, Pan et al. (2013) eq. 9; on (xi^2, xi eta, eta^2, xi, eta, 1), less what is of
+/// higher order, for the second, Gao et al. (2015) eq. 12. `half` is that of the subset, whose edges are at 1 here.
 Eigen::Matrix3d as_matrix(const Warp& warp, double half, std::integral_constant<int, 1>) {
     const auto& [u, v] = warp;
     Eigen::Matrix3d matrix;
@@ -52,8 +53,9 @@ Eigen::Matrix<double, 6, 6> as_matrix(const Warp& warp, double half, std::integr
     const auto f = std::array{warp.u[5] / half, warp.v[5] / half};
     Eigen::Matrix<double, 6, 6> matrix;
     const auto product = [&](int row, int i, int j) {  // of the warped coordinates i and j
-        matrix.row(row) << a[i] * a[j] + c[i] * d[j] + d[i] * c[j], a[i] * b[j] + b[i] * a[j] + c[i] * e[j] + e[i] * c[j],
-            b[i] * b[j] + c[i] * f[j] + f[i] * c[j], a[i] * c[j] + c[i] * a[j], b[i] * c[j] + c[i] * b[j], c[i] * c[j];
+        matrix.row(row) << a[i] * a[j] + c[i] * d[j] + d[i] * c[j],
+            a[i] * b[j] + b[i] * a[j] + c[i] * e[j] + e[i] * c[j], b[i] * b[j] + c[i] * f[j] + f[i] * c[j],
+            a[i] * c[j] + c[i] * a[j], b[i] * c[j] + c[i] * b[j], c[i] * c[j];
     };
     product(0, 0, 0);
     product(1, 0, 1);
@@ -100,8 +102,8 @@ FinePicture smooth(FinePicture picture, double radius) {
 template <class Lanes> Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const Lanes& ty) {
     const auto weights = [](const Lanes& t) {
         const Lanes s = 1.0f - t, tt = t * t, ss = s * s;
-        return std::array<Lanes, 4>{ss * s * (1.0f / 6), 2.0f / 3 - tt * (1.0f - 0.5f * t), 2.0f / 3 - ss * (1.0f - 0.5f * s),
-                                    tt * t * (1.0f / 6)};
+        return std::array<Lanes, 4>{ss * s * (1.0f / 6), 2.0f / 3 - tt * (1.0f - 0.5f * t),
+                                    2.0f / 3 - ss * (1.0f - 0.5f * s), tt * t * (1.0f / 6)};
     };
     const std::array<Lanes, 4> wx = weights(tx), wy = weights(ty);
     Lanes value = Lanes::Zero();
@@ -128,7 +130,8 @@ SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const Spl
     const auto blocks = static_cast<std::size_t>(blocks_);
     const std::size_t count = blocks * static_cast<std::size_t>(subset);
     for (int block = 0; block < blocks_; ++block) {
-        const Lanes from_left = Lanes::LinSpaced(static_cast<float>(block * width), static_cast<float>(block * width + width - 1));
+        const Lanes from_left =
+            Lanes::LinSpaced(static_cast<float>(block * width), static_cast<float>(block * width + width - 1));
         inside_.push_back((from_left < static_cast<float>(subset)).template cast<float>());
         xi_.push_back((from_left - static_cast<float>(half_)) / static_cast<float>(half_));
     }
@@ -168,13 +171,14 @@ template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
 }
 
 // The steepest descents are the slopes times the monomials of the warp. Sums of products of two of them are moments of
-// slope products: sum of fx fx xi^a eta^b and so on, a + b up to twice the order. The gray's offset and gain are free in ZNSSD,
-// and what of the descents they can make up for is taken off: descents less their mean and less their part along the
-// reference's gray.
+// slope products: sum of fx fx xi^a eta^b and so on, a + b up to twice the order. The gray's offset and gain are free
+// in ZNSSD, and what of the descents they can make up for is taken off: descents less their mean and less their part
+// along the reference's gray.
 template <int Order> void SubsetMatcher<Order>::make_matrices() {
     constexpr int degree = 2 * Order;
     std::array<std::array<std::array<double, degree + 1>, degree + 1>, 7> moments{};
-    std::array<std::array<double, terms>, 8> sums{};  // of the smooth slopes and the slopes, by x and y, alone and times the gray
+    std::array<std::array<double, terms>, 8>
+        sums{};  // of the smooth slopes and the slopes, by x and y, alone and times the gray
     for (int row = 0; row <= 2 * half_; ++row) {
         std::array<std::array<Lanes, degree + 1>, 7> along;
         std::array<std::array<Lanes, Order + 1>, 8> first;
@@ -204,7 +208,9 @@ template <int Order> void SubsetMatcher<Order>::make_matrices() {
     Square tangent;
     for (std::size_t m = 0; m < terms; ++m)
         for (std::size_t n = 0; n < terms; ++n) {
-            const auto moment = [&](std::size_t kind) { return moments[kind][powers[m][0] + powers[n][0]][powers[m][1] + powers[n][1]]; };
+            const auto moment = [&](std::size_t kind) {
+                return moments[kind][powers[m][0] + powers[n][0]][powers[m][1] + powers[n][1]];
+            };
             const auto i = static_cast<Eigen::Index>(m), j = static_cast<Eigen::Index>(n);
             tangent(i, j) = moment(0);
             tangent(i, terms + j) = moment(1);
@@ -229,8 +235,8 @@ template <int Order> void SubsetMatcher<Order>::make_matrices() {
     tangent_.compute(tangent);
 }
 
-/// White noise of variance s^2 in what is left of the grays moves the parameters by covariance s^2 A^-1 B A^-T, A the tangent
-/// and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1.
+/// White noise of variance s^2 in what is left of the grays moves the parameters by covariance s^2 A^-1 B A^-T, A the
+/// tangent and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1.
 template <int Order> double SubsetMatcher<Order>::standard_error(double residual_variance) const {
     const Square inverse = tangent_.inverse();
     const auto variance = [&](int i) { return inverse.row(i).dot(inverse.row(i) * noise_); };
@@ -239,7 +245,8 @@ template <int Order> double SubsetMatcher<Order>::standard_error(double residual
 
 template <int Order> bool SubsetMatcher<Order>::stays_inside(int x, int y, const Warp& warp) const {
     const auto inside = [&](int centre, const std::array<double, 6>& terms_of, std::size_t along, int count) {
-        const double spread = std::abs(half_ + terms_of[along]) + reach(terms_of) - std::abs(terms_of[0]) - std::abs(terms_of[along]);
+        const double spread =
+            std::abs(half_ + terms_of[along]) + reach(terms_of) - std::abs(terms_of[0]) - std::abs(terms_of[along]);
         const double place = centre + terms_of[0];
         return place - spread >= 0 && place + spread <= count - 1;
     };
@@ -248,12 +255,14 @@ template <int Order> bool SubsetMatcher<Order>::stays_inside(int x, int y, const
 
 /// Fills `sampled_` with the image's gray at the warped places of one row.
 template <int Order> void SubsetMatcher<Order>::sample_row(int x, int y, const Warp& warp, int row) {
-    // Whole pixels of the centre's displacement are kept apart: what is left is small, and exact enough in single precision.
+    // Whole pixels of the centre's displacement are kept apart: what is left is small, and exact enough in single
+    // precision.
     const double whole_u = std::floor(warp.u[0]), whole_v = std::floor(warp.v[0]);
     const auto eta = static_cast<float>(static_cast<double>(row - half_) / half_);
     const auto along = [&](const std::array<double, 6>& t, double whole) {  // coefficients of 1, xi, xi^2
         const auto f = [](double value) { return static_cast<float>(value); };
-        return std::array<float, 3>{f(t[0] - whole) + eta * (f(t[2]) + eta * f(t[5])), f(t[1]) + eta * f(t[4]), f(t[3])};
+        return std::array<float, 3>{f(t[0] - whole) + eta * (f(t[2]) + eta * f(t[5])), f(t[1]) + eta * f(t[4]),
+                                    f(t[3])};
     };
     const std::array<float, 3> u = along(warp.u, whole_u), v = along(warp.v, whole_v);
     const float* origin = image_.at(x - half_ + static_cast<int>(whole_u), y - half_ + row + static_cast<int>(whole_v));
@@ -267,8 +276,8 @@ template <int Order> void SubsetMatcher<Order>::sample_row(int x, int y, const W
         const Lanes left = dx.floor(), above = dy.floor();
         dx -= left;
         dy -= above;
-        // Neighbouring pixels mostly stay neighbours, so that their coefficients lie side by side. Where the warp has drifted
-        // a whole pixel a new run begins; it overwrites what the run before has left beyond its end.
+        // Neighbouring pixels mostly stay neighbours, so that their coefficients lie side by side. Where the warp has
+        // drifted a whole pixel a new run begins; it overwrites what the run before has left beyond its end.
         const auto run = [&](int begin) {
             const float* at = origin + block * width + static_cast<std::ptrdiff_t>(left[begin]) +
                               static_cast<std::ptrdiff_t>(above[begin]) * image_.stride();
@@ -300,7 +309,8 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
         for (int block = 0; block < blocks_; ++block) {
             const auto at = static_cast<std::size_t>(row * blocks_ + block);
             const Lanes& xi = xi_[static_cast<std::size_t>(block)];
-            const Lanes g = (Eigen::Map<const Lanes>(sampled_.data() + block * width) - mean) * inside_[static_cast<std::size_t>(block)];
+            const Lanes g = (Eigen::Map<const Lanes>(sampled_.data() + block * width) - mean) *
+                            inside_[static_cast<std::size_t>(block)];
             gray += g;
             squared += g * g;
             by_reference += g * gray_[at];
@@ -322,7 +332,10 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
             by_descent[terms + m] += by_y[a] * by_eta[b];
         }
     }
-    Sums sums{static_cast<double>(gray.sum()), static_cast<double>(squared.sum()), static_cast<double>(by_reference.sum()), {}};
+    Sums sums{static_cast<double>(gray.sum()),
+              static_cast<double>(squared.sum()),
+              static_cast<double>(by_reference.sum()),
+              {}};
     for (int m = 0; m < 2 * terms; ++m)
         sums.by_descent[m] = static_cast<double>(by_descent[static_cast<std::size_t>(m)].sum());
     return sums;

@@ -13,13 +13,14 @@
 namespace crampfit {
 namespace {
 
-constexpr double border = 100;    // of pattern around the picture, to move into it [px]
-constexpr int most_trials = 200;  // of the search for where a place came from
+constexpr double border = 100;         // of pattern around the picture, to move into it [px]
+constexpr int most_trials = 200;       // of the search for where a place came from
 constexpr double close_enough = 1e-9;  // [px]
 
 enum Stream : std::uint64_t { spot_x, spot_y, spot_strength, first_noise };
 
-/// The place x that has moved to `seen`: the fixed point of x = seen - u(x), which contracts as the gradient of u is below
+/// The place x that has moved to `seen`: the fixed point of x = seen - u(x), which contracts as the gradient of u is
+/// below
 /// 1. In an open crack either side points to the other, and there is none.
 std::optional<Vec2> origin_of(const Vec2& seen, const PlaneDisplacement& displacement) {
     Vec2 place = seen;

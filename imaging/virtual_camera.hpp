@@ -13,11 +13,11 @@ namespace crampfit {
 struct VirtualCameraOptions {
     int columns = 512;
     int rows = 512;
-    double spot_radius = 1.6;   // standard deviation of a Gaussian spot, the lens's blur included [px]
-    double mean = 128;          // gray
-    double contrast = 35;       // standard deviation of the pattern's gray
-    double noise = 1;           // standard deviation of each pixel's gray, anew in each picture
-    double gap_gray = 10;       // where a crack lets one see through
+    double spot_radius = 1.6;  // standard deviation of a Gaussian spot, the lens's blur included [px]
+    double mean = 128;         // gray
+    double contrast = 35;      // standard deviation of the pattern's gray
+    double noise = 1;          // standard deviation of each pixel's gray, anew in each picture
+    double gap_gray = 10;      // where a crack lets one see through
     std::uint64_t seed = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.
@@ -28,8 +28,8 @@ struct VirtualCameraOptions {
 using PlaneDisplacement = std::function<Vec2(const Vec2&)>;
 
 /// Photographs a speckle pattern that moves with a given displacement. The pattern is a sum of Gaussian spots at random
-/// places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and the
-/// rounding to whole grays.
+/// places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and
+/// the rounding to whole grays.
 class VirtualCamera {
   public:
     /// Throws InputError for bad options.
@@ -48,7 +48,7 @@ class VirtualCamera {
     double pattern(const Vec2& place) const;
 
     VirtualCameraOptions options_;
-    double cell_;             // edge of a square that holds one spot [px]
+    double cell_;  // edge of a square that holds one spot [px]
     int cells_across_ = 0;
     std::vector<Spot> spots_;  // [cells down x cells across], from `border` outside the picture on
 };

@@ -85,7 +85,9 @@ TEST(SystemCorrelate, BadPicturesAreNamed) {
     Command command;
     const std::string good = write_pgm(command, "good.pgm", camera().photograph(0));
     const std::string whole = command.folder.read("good.pgm");
-    const auto file = [&](const char* name, const std::string& bytes) { return command.folder.write(name, bytes).string(); };
+    const auto file = [&](const char* name, const std::string& bytes) {
+        return command.folder.write(name, bytes).string();
+    };
     const std::string black(240 * 200, '\0');
     const std::string huge = "P5\n30000 30000\n255\n";
     const std::map<std::string, std::string> bad{
@@ -94,7 +96,8 @@ TEST(SystemCorrelate, BadPicturesAreNamed) {
         {file("black.pgm", "P5\n240 200\n255\n" + black), "gray 0 only"},
         {file("short.pgm", whole.substr(0, whole.size() / 2)), "cut short"},
         {file("huge.pgm", huge), "2^28 pixels"},
-        {file("huge.png", "\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR", 8) + big_endian(30000) + big_endian(30000)), "cut short"},
+        {file("huge.png", "\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR", 8) + big_endian(30000) + big_endian(30000)),
+         "cut short"},
         {file("text.png", "no picture"), "no picture"},
         {write_pgm(command, "small.pgm", VirtualCamera({.columns = 239, .rows = 200}).photograph(0)), "one size"},
         {command.path("missing.png"), "no such file"},
@@ -119,11 +122,15 @@ TEST(SystemTrack, SeriesAndExperiment) {
     std::vector<std::string> words{"track", write_pgm(command, "0.pgm", camera().photograph(0))};
     const std::vector<double> tips{90, 110, 130};
     for (std::size_t i = 0; i < tips.size(); ++i)
-        words.push_back(write_pgm(command, std::to_string(i + 1) + ".pgm", camera().photograph(crack_field({tips[i], 100.2}, 0, 3, 0), i + 1)));
+        words.push_back(write_pgm(command, std::to_string(i + 1) + ".pgm",
+                                  camera().photograph(crack_field({tips[i], 100.2}, 0, 3, 0), i + 1)));
     words.push_back(write_pgm(command, "4.pgm", camera().photograph(4)));  // nothing has moved
     const std::string times = command.folder.write("times.csv", "time [s]\n1\n2\n3\n4\n").string();
-    const std::string load = command.folder.write("load.csv", "time [s],force [N],displacement [mm]\n0,0,0\n2,10,0.2\n3.5,40,0.35\n").string();
-    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--times", times, "--load", load, "--preview", command.path("p.png")});
+    const std::string load =
+        command.folder.write("load.csv", "time [s],force [N],displacement [mm]\n0,0,0\n2,10,0.2\n3.5,40,0.35\n")
+            .string();
+    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--times", times, "--load", load,
+                               "--preview", command.path("p.png")});
     const Outcome outcome = command.run(words);
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_GT(command.folder.read("p.png").size(), 1000u);
@@ -141,7 +148,8 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_EQ(rows[3]["status"], "no crack");
     EXPECT_EQ(rows[3]["tip_x_px"], "nan");
 
-    const auto data = command.folder.write("experiment.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out);
+    const auto data =
+        command.folder.write("experiment.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out);
     const Curves curves = read_curves(data);
     ASSERT_EQ(curves.time.size(), 4u);
     EXPECT_NEAR(curves.force[0], 5, 1e-9);

@@ -20,11 +20,11 @@ FinePicture fine(const GrayPicture& picture) {
 }
 
 struct Errors {
-    double bias_u = 0, bias_v = 0;    // [px]
-    double worst_displacement = 0;    // root mean square [px]
-    double strain = 0;                // root mean square over exx, eyy, exy
+    double bias_u = 0, bias_v = 0;  // [px]
+    double worst_displacement = 0;  // root mean square [px]
+    double strain = 0;              // root mean square over exx, eyy, exy
     double worst_strain = 0;
-    double sigma = 0;                 // mean of what the field says of itself [px]
+    double sigma = 0;  // mean of what the field says of itself [px]
     int followed = 0;
 };
 
@@ -67,7 +67,8 @@ PlaneField stretched(double by) {
 
 /// Strain rises to `most` at the picture's right side.
 PlaneField bent(double most) {
-    return polynomial_field({0, 256}, {0, 0, most / 1024, 0, 0}, {0, -0.3 * most, 0, -0.2 * most / 512, 0.3 * most / 1024});
+    return polynomial_field({0, 256}, {0, 0, most / 1024, 0, 0},
+                            {0, -0.3 * most, 0, -0.2 * most / 512, 0.3 * most / 1024});
 }
 
 void expect_within_bars(const char* what, const PlaneField& truth, int order, double noise) {
@@ -79,9 +80,11 @@ void expect_within_bars(const char* what, const PlaneField& truth, int order, do
     const Correlator correlator(fine(camera.photograph(0)), {}, options, "reference");
     const DisplacementField field = correlator.field(fine(camera.photograph(truth.displacement, 1)));
     const Errors errors = compare(correlator.lattice(), field, truth);
-    std::printf("%s, order %d, noise %g: bias %.4f %.4f px, rms %.4f px (said: %.4f); strain rms %.0f, worst %.0f microstrain; "
-                "%d of %d followed\n", what, order, noise, errors.bias_u, errors.bias_v, errors.worst_displacement, errors.sigma,
-                1e6 * errors.strain, 1e6 * errors.worst_strain, errors.followed, correlator.lattice().count());
+    std::printf(
+        "%s, order %d, noise %g: bias %.4f %.4f px, rms %.4f px (said: %.4f); strain rms %.0f, worst %.0f microstrain; "
+        "%d of %d followed\n",
+        what, order, noise, errors.bias_u, errors.bias_v, errors.worst_displacement, errors.sigma, 1e6 * errors.strain,
+        1e6 * errors.worst_strain, errors.followed, correlator.lattice().count());
     EXPECT_LT(errors.worst_displacement, 0.01);
     EXPECT_LT(errors.strain, 200e-6);
     EXPECT_GT(errors.followed, 0.8 * correlator.lattice().count());  // up to 13 px leave at the sides
@@ -111,14 +114,15 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
         CorrelateOptions options;
         options.step = 16;
         const Correlator correlator(fine(camera.photograph(0)), {}, options, "reference");
-        const Errors errors = compare(correlator.lattice(), correlator.field(fine(camera.photograph(truth.displacement, 1))), truth);
+        const Errors errors =
+            compare(correlator.lattice(), correlator.field(fine(camera.photograph(truth.displacement, 1))), truth);
         std::printf("noise %g: scatter %.4f px, said %.4f px\n", noise, errors.worst_displacement, errors.sigma);
         EXPECT_NEAR(errors.sigma / errors.worst_displacement, 1.0, 0.15);  // interpolation hides a tenth of the noise
     }
 }
 
-// The public set of shifted speckle pictures; bars: bias 0.005 px, standard deviation 0.01 px. Its pictures are the reference
-// resampled by linear interpolation, which shows fine details up to 0.03 px from where they should be.
+// The public set of shifted speckle pictures; bars: bias 0.005 px, standard deviation 0.01 px. Its pictures are the
+// reference resampled by linear interpolation, which shows fine details up to 0.03 px from where they should be.
 TEST(VerificationCorrelate, PublicShiftedPictures) {
     const std::filesystem::path folder = std::filesystem::path(SHARED_DATA) / "dic";
     if (!std::filesystem::exists(folder))
@@ -129,10 +133,12 @@ TEST(VerificationCorrelate, PublicShiftedPictures) {
     const Correlator correlator(read("ref"), {}, {}, "reference");
     for (int i = 0; i <= 10; ++i) {
         const DisplacementField field = correlator.field(read(std::to_string(i)));
-        Eigen::Map<const Eigen::ArrayXd> u(field.u.data(), correlator.lattice().count()), v(field.v.data(), correlator.lattice().count());
+        Eigen::Map<const Eigen::ArrayXd> u(field.u.data(), correlator.lattice().count()),
+            v(field.v.data(), correlator.lattice().count());
         const double bias_u = u.mean() + 0.1 * i, bias_v = v.mean();
         const double sd_u = std::sqrt((u - u.mean()).square().mean()), sd_v = std::sqrt((v - v.mean()).square().mean());
-        std::printf("shift %.1f px: bias %7.4f %7.4f px, standard deviation %.4f %.4f px\n", 0.1 * i, bias_u, bias_v, sd_u, sd_v);
+        std::printf("shift %.1f px: bias %7.4f %7.4f px, standard deviation %.4f %.4f px\n", 0.1 * i, bias_u, bias_v,
+                    sd_u, sd_v);
         EXPECT_LT(std::abs(bias_u), 0.005);  // not a number where a point was lost: the test then fails
         EXPECT_LT(std::abs(bias_v), 0.005);
         EXPECT_LT(sd_u, 0.01);
@@ -150,7 +156,8 @@ TEST(VerificationCorrelate, SameBitsForAnyNumberOfThreads) {
         options.threads = threads;
         options.step = 5;
         std::vector<double> u = Correlator(reference, {}, options, "reference").field(image).u;
-        std::ranges::replace_if(u, [](double value) { return std::isnan(value); }, -1e9);
+        std::ranges::replace_if(
+            u, [](double value) { return std::isnan(value); }, -1e9);
         if (threads == 1)
             alone = u;
         EXPECT_EQ(u, alone) << threads << " threads";
@@ -173,18 +180,20 @@ TEST(VerificationCorrelate, NoPointIsFollowedAcrossACrack) {
             EXPECT_EQ(lost, std::isnan(field.u[i]));
             EXPECT_EQ(lost, std::isnan(field.v[i]));
             const double above = std::abs(lattice.y(point) - 150.5);
-            if (lattice.x(point) < 200 && above < 12) {  // at least an eighth of the subset lies beyond an opening of at least `opening`
+            if (lattice.x(point) < 200 &&
+                above < 12) {  // at least an eighth of the subset lies beyond an opening of at least `opening`
                 ++over;
                 over_lost += lost ? 1 : 0;
             } else if (lattice.x(point) < 200 && above > 16) {
                 ++others;
                 others_lost += lost ? 1 : 0;
                 if (!lost)
-                    worst = std::max(worst, (Vec2(field.u[i], field.v[i]) - truth(Vec2(lattice.x(point), lattice.y(point)))).norm());
+                    worst = std::max(
+                        worst, (Vec2(field.u[i], field.v[i]) - truth(Vec2(lattice.x(point), lattice.y(point)))).norm());
             }
         }
-        std::printf("opening %g px: %d of %d over the crack lost, %d of %d others; worst of the others %.3f px\n", opening, over_lost, over,
-                    others_lost, others, worst);
+        std::printf("opening %g px: %d of %d over the crack lost, %d of %d others; worst of the others %.3f px\n",
+                    opening, over_lost, over, others_lost, others, worst);
         EXPECT_EQ(over_lost, over);
         EXPECT_LT(others_lost, 0.05 * others);
         EXPECT_LT(worst, 0.05);
@@ -201,7 +210,9 @@ TEST(UnitCorrelate, NoSubsetReachesOverTheMask) {
     const DisplacementField field = correlator.field(reference);
     for (int point = 0; point < correlator.lattice().count(); ++point) {
         const int away = std::abs(correlator.lattice().x(point) - 95);
-        const PointStatus expected = away == 0 ? PointStatus::masked : away <= 15 ? PointStatus::across_mask : PointStatus::ok;
+        const PointStatus expected = away == 0    ? PointStatus::masked
+                                     : away <= 15 ? PointStatus::across_mask
+                                                  : PointStatus::ok;
         EXPECT_EQ(field.status[static_cast<std::size_t>(point)], expected) << away;
     }
 }

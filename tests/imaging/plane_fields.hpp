@@ -14,9 +14,10 @@ struct PlaneField {
     std::function<Eigen::Matrix2d(const crampfit::Vec2&)> gradient;  // du_i / dx_j
 };
 
-/// Displacement `shift` + a polynomial of the distance from `origin` with the coefficients of dx, dy, dx^2, dx dy, dy^2.
-inline PlaneField polynomial_field(const crampfit::Vec2& origin, const std::array<double, 5>& u, const std::array<double, 5>& v,
-                                   const crampfit::Vec2& shift = {0, 0}) {
+/// Displacement `shift` + a polynomial of the distance from `origin` with the coefficients of dx, dy, dx^2, dx dy,
+/// dy^2.
+inline PlaneField polynomial_field(const crampfit::Vec2& origin, const std::array<double, 5>& u,
+                                   const std::array<double, 5>& v, const crampfit::Vec2& shift = {0, 0}) {
     using crampfit::Vec2;
     const auto value = [origin](const std::array<double, 5>& c, const Vec2& place) {
         const Vec2 d = place - origin;
@@ -34,9 +35,9 @@ inline PlaneField polynomial_field(const crampfit::Vec2& origin, const std::arra
             }};
 }
 
-/// The field around the tip of a straight crack with free faces in isotropic wood, first term (Williams 1957; Anderson 2005,
-/// "Fracture Mechanics", table 2.2), and a rigid motion. The crack runs from `tip` back against `angle`; `opening` and `sliding`
-/// are the jumps across its faces at 100 px behind the tip [px].
+/// The field around the tip of a straight crack with free faces in isotropic wood, first term (Williams 1957; Anderson
+/// 2005, "Fracture Mechanics", table 2.2), and a rigid motion. The crack runs from `tip` back against `angle`;
+/// `opening` and `sliding` are the jumps across its faces at 100 px behind the tip [px].
 inline crampfit::PlaneDisplacement crack_field(const crampfit::Vec2& tip, double angle, double opening, double sliding,
                                                const crampfit::Vec2& shift = {0, 0}, double kappa = 2.0) {
     using crampfit::Vec2;
