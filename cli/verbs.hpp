@@ -18,6 +18,8 @@ Verb simulate_verb(CLI::App& command, const CommonOptions& common);
 Verb explain_verb(CLI::App& command, const CommonOptions& common);
 Verb fit_verb(CLI::App& command, const CommonOptions& common);
 Verb segment_verb(CLI::App& command, const CommonOptions& common);
+Verb correlate_verb(CLI::App& command, const CommonOptions& common);
+Verb track_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
 Verb bench_verb(CLI::App& command, const CommonOptions& common);
 

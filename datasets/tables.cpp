@@ -1,12 +1,16 @@
+#include "datasets/crack_track.hpp"
+#include "datasets/displacement_field.hpp"
 #include "datasets/error.hpp"
 #include "datasets/hdf5.hpp"
 #include "datasets/io.hpp"
 #include "datasets/record_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ostream.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -214,6 +218,36 @@ Table orientation_table(const Specimen& specimen) {
             table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees),
                              fmt::format("{:.4f}", coherency)});
         }
+// ---- tables of displacement fields, which may be too large to be held at once
+
+void print_points(const std::filesystem::path& file, std::ostream& out) {
+    print({{"image", "x_px", "y_px", "u_px", "v_px", "exx", "eyy", "exy", "zncc", "sigma_px", "status"}}, out);
+    read_fields(file, [&](const FieldSeries& series, int image, const DisplacementField& field) {
+        for (int point = 0; point < series.lattice.count(); ++point) {
+            const auto i = static_cast<std::size_t>(point);
+            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point),
+                       series.lattice.y(point), field.u[i], field.v[i], field.exx[i], field.eyy[i], field.exy[i],
+                       field.zncc[i], field.sigma[i], name(field.status[i]));
+        }
+    });
+}
+
+/// As `read_curves` reads it, for the data of an experiment; gaps are empty.
+Table curves_table(const Curves& curves) {
+    struct Column {
+        const char* head;
+        const std::vector<double>& values;
+        double unit;  // SI
+    };
+    Table table(1);
+    for (const Column& column : {Column{"time [s]", curves.time, 1}, {"displacement [mm]", curves.displacement, 1e-3},
+                                 {"force [N]", curves.force, 1}, {"crack_length [mm]", curves.crack_length, 1e-3}}) {
+        if (column.values.empty())
+            continue;
+        table.resize(column.values.size() + 1);
+        table.front().push_back(column.head);
+        for (std::size_t i = 0; i < column.values.size(); ++i)
+            table[i + 1].push_back(std::isnan(column.values[i]) ? "" : text_of(column.values[i] / column.unit));
     }
     return table;
 }
@@ -222,6 +256,30 @@ std::vector<Offer> offers(const Specimen& specimen) {
     return {{"borders", [&] { return borders_table(specimen); }},
             {"rings", [&] { return rings_table(specimen); }},
             {"orientation", [&] { return orientation_table(specimen); }}};
+Table image_table(const std::string& reference, const std::vector<std::string>& images) {
+    Table table{{"image", "file"}, {"reference", reference}};
+    for (std::size_t i = 0; i < images.size(); ++i)
+        table.push_back({std::to_string(i), images[i]});
+    return table;
+}
+
+// ---- tables of a crack track
+
+Table tip_table(const CrackTrack& track) {
+    Table table{{"image", "time_s", "tip_x_px", "tip_y_px", "crack_length_m", "sigma_m", "status"}};
+    const double pixel = track.pixel.value_or(CrackTip::unknown);
+    for (std::size_t i = 0; i < track.tips.size(); ++i) {
+        const CrackTip& tip = track.tips[i];
+        table.push_back({std::to_string(i), text_of(track.time.empty() ? CrackTip::unknown : track.time[i]), text_of(tip.tip.x()),
+                         text_of(tip.tip.y()), text_of(tip.length * pixel), text_of(tip.sigma * pixel), name(tip.status)});
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const CrackTrack& track) {
+    return {{"series", [&] { return tip_table(track); }},
+            {"images", [&] { return image_table(track.reference, track.images); }},
+            {"experiment", [&] { return curves_table(curves_of(track)); }}};
 }
 
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
@@ -250,6 +308,15 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     } else if (kind == "specimen") {
         const Specimen specimen = read_specimen(file);
         print_one_of(offers(specimen), file, table, out);
+    } else if (kind == "field" && table == "points") {
+        print_points(file, out);
+    } else if (kind == "field") {
+        const FieldSeries series = read_field_series(file);
+        const auto images = [&] { return image_table(series.reference, series.images); };
+        print_one_of({{"points", {}}, {"images", images}}, file, table, out);
+    } else if (kind == "track") {
+        const CrackTrack track = read_crack_track(file);
+        print_one_of(offers(track), file, table, out);
     } else {
         print_one_of({}, file, table, out);
     }

@@ -103,14 +103,12 @@ std::vector<std::uint8_t> read_bytes(const std::filesystem::path& file, const Pi
     return bytes;
 }
 
-cv::Mat to_gray(const cv::Mat& picture) {
+cv::Mat to_gray(const cv::Mat& picture, int depth) {
     cv::Mat gray = picture;
     if (picture.channels() == 3) {
         cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
     }
-    if (gray.depth() == CV_16U) {
-        gray.convertTo(gray, CV_8U, 1.0 / 257.0);
-    }
+    gray.convertTo(gray, depth, gray.depth() == CV_16U ? 1.0 / 257.0 : 1.0);
     return gray;
 }
 
@@ -141,8 +139,13 @@ cv::Mat read_pixels(const std::filesystem::path& file, const PictureKey& asked_b
 }
 
 GrayPicture read_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
-    const cv::Mat gray = to_gray(read_pixels(file, asked_by));
+    const cv::Mat gray = to_gray(read_pixels(file, asked_by), CV_8U);
     return {gray.cols, gray.rows, {gray.begin<std::uint8_t>(), gray.end<std::uint8_t>()}};
+}
+
+FinePicture read_fine_gray(const std::filesystem::path& file, const PictureKey& asked_by) {
+    const cv::Mat gray = to_gray(read_pixels(file, asked_by), CV_32F);
+    return {gray.cols, gray.rows, {gray.begin<float>(), gray.end<float>()}};
 }
 
 }  // namespace crampfit

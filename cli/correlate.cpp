@@ -1,0 +1,55 @@
+#include "cli/pictures.hpp"
+#include "cli/progress.hpp"
+#include "cli/stop.hpp"
+#include "cli/verbs.hpp"
+#include "imaging/field_preview.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+namespace crampfit::cli {
+
+namespace {
+
+ExitStatus correlate(const PictureSeries& pictures, const CommonOptions& common) {
+    check_series(pictures, common);
+    const std::optional<double> pixel = pixel_of(pictures);
+    const Correlator correlator = make_correlator(pictures, common);
+    const FieldSeries series{pictures.reference.string(), names_of(pictures),     correlator.lattice(),
+                             pictures.options.subset,     pictures.options.order, pixel};
+
+    stop_on_signals();
+    ProgressLine line(common, "points");
+    long followed = 0;
+    int done = 0;
+    std::optional<DisplacementField> last;
+    const int count = static_cast<int>(pictures.images.size());
+    const auto next_field = [&](int image) -> std::optional<DisplacementField> {
+        if (stop_requested())
+            return std::nullopt;
+        last = correlator.field(read_image(pictures, image));
+        followed += std::ranges::count(last->status, PointStatus::ok);
+        done = image + 1;
+        line.show(static_cast<double>(done) / count, followed, fmt::format("image {} of {}", done, count));
+        return last;
+    };
+    write_fields(series, next_field, pictures.output);
+    if (!pictures.preview.empty() && last)
+        draw_field(read_reference(pictures), series.lattice, *last, pictures.preview);
+    report(common, fmt::format("{} of {} points in {} images followed, saved as {}", followed,
+                               static_cast<long>(series.lattice.count()) * done, done, pictures.output.string()));
+    return done < count ? ExitStatus::interrupted : ExitStatus::done;
+}
+
+}  // namespace
+
+Verb correlate_verb(CLI::App& command, const CommonOptions& common) {
+    auto pictures = std::make_shared<PictureSeries>();
+    CLI::App* verb = command.add_subcommand("correlate", "Displacement and strain by image correlation");
+    add_picture_series(*verb, *pictures, "FIELD.h5");
+    return {verb, [pictures, &common] { return correlate(*pictures, common); }};
+}
+
+}  // namespace crampfit::cli

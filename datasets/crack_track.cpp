@@ -1,0 +1,148 @@
+#include "datasets/crack_track.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/hdf5.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace crampfit {
+
+using hdf5::Group;
+
+namespace {
+
+constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack",
+                                                                 "tip outside the picture"};
+
+struct TipColumn {
+    const char* name;
+    hdf5::Meaning meaning;
+    double CrackTip::*value;
+};
+
+const TipColumn tip_columns[] = {
+    {"angle", {"rad", "in which the crack points, clockwise as seen, from +x"}, &CrackTip::angle},
+    {"length", {"px", "from where the crack's line enters the picture to the tip"}, &CrackTip::length},
+    {"sigma", {"px", "standard error of the length"}, &CrackTip::sigma},
+};
+
+struct LoadColumn {
+    const char* name;
+    hdf5::Meaning meaning;
+    std::vector<double> CrackTrack::*values;
+};
+
+const LoadColumn load_columns[] = {
+    {"time", {"s", "of each image"}, &CrackTrack::time},
+    {"displacement", {"m", "of the loading at each image's time"}, &CrackTrack::displacement},
+    {"force", {"N", "of the loading at each image's time"}, &CrackTrack::force},
+};
+
+/// Linear between the rows; not a number outside them or beside a gap.
+double interpolate(const std::vector<double>& times, const std::vector<double>& values, double time) {
+    if (!(time >= times.front() && time <= times.back()))
+        return CrackTip::unknown;
+    const auto after = std::ranges::lower_bound(times, time);
+    const auto i = static_cast<std::size_t>(after - times.begin());
+    if (*after == time)
+        return values[i];
+    const double part = (time - times[i - 1]) / (times[i] - times[i - 1]);
+    return values[i - 1] + part * (values[i] - values[i - 1]);
+}
+
+}  // namespace
+
+const char* name(TipStatus status) { return status_names.at(static_cast<std::size_t>(status)); }
+
+void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file) {
+    if (load.time.empty())
+        throw InputError(file.string(), "time", "no such column",
+                         "the load needs its time, on the clock of the images");
+    if (load.displacement.empty() && load.force.empty())
+        throw InputError(file.string(), "", "", "needs a column displacement or force beside the time");
+    for (std::size_t i = 0; i < load.time.size(); ++i)
+        if (std::isnan(load.time[i]) || (i > 0 && !(load.time[i] > load.time[i - 1])))
+            throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", load.time[i]),
+                             "times must rise from row to row, without gaps");
+    const auto add = [&](const std::vector<double>& from, std::vector<double>& to) {
+        for (const double time : track.time)
+            if (!from.empty())
+                to.push_back(interpolate(load.time, from, time));
+    };
+    add(load.displacement, track.displacement);
+    add(load.force, track.force);
+}
+
+Curves curves_of(const CrackTrack& track) {
+    Curves curves;
+    curves.time = track.time;
+    curves.displacement = track.displacement;
+    curves.force = track.force;
+    for (const CrackTip& tip : track.tips)
+        if (track.pixel)
+            curves.crack_length.push_back(tip.length * *track.pixel);
+    return curves;
+}
+
+void write(const CrackTrack& track, const std::filesystem::path& file) {
+    hdf5::save(file, "track", [&](Group& root) {
+        root.write_text("reference", track.reference, "picture that all others are compared with");
+        root.write_texts("image files", track.images, "pictures by their number");
+        if (track.pixel)
+            root.write("pixel", *track.pixel, {"m", "edge of a pixel"});
+        root.write_texts("status names", {status_names.begin(), status_names.end()}, "whether a tip was found");
+        std::vector<std::uint8_t> status;
+        std::vector<Vec2> tips;
+        for (const CrackTip& tip : track.tips) {
+            status.push_back(static_cast<std::uint8_t>(tip.status));
+            tips.push_back(tip.tip);
+        }
+        root.write("status", status, {"1", "index into `status names`; 0 is a tip that was found"});
+        root.write(
+            "tip", tips,
+            {"px", "x right, y down, from the centre of the first pixel, at the material's place in the reference"});
+        for (const TipColumn& column : tip_columns) {
+            std::vector<double> values;
+            for (const CrackTip& tip : track.tips)
+                values.push_back(tip.*column.value);
+            root.write(column.name, values, column.meaning);
+        }
+        for (const LoadColumn& column : load_columns)
+            if (!(track.*column.values).empty())
+                root.write(column.name, track.*column.values, column.meaning);
+    });
+}
+
+CrackTrack read_crack_track(const std::filesystem::path& file) {
+    const Group root = hdf5::open(file, "track");
+    CrackTrack track;
+    track.reference = root.read_text("reference");
+    track.images = root.read_texts("image files");
+    if (root.has("pixel"))
+        track.pixel = root.read_number<double>("pixel");
+    const std::size_t count = track.images.size();
+    const std::vector<Vec2> tips = root.read_rows<double, 2>("tip", count);
+    const std::vector<std::uint8_t> status = root.read_column<std::uint8_t>("status", count);
+    track.tips.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        if (status[i] >= tip_status_count)
+            root.refuse("status", std::to_string(status[i]), fmt::format("must be less than {}", tip_status_count));
+        track.tips[i].status = static_cast<TipStatus>(status[i]);
+        track.tips[i].tip = tips[i];
+    }
+    for (const TipColumn& column : tip_columns) {
+        const std::vector<double> values = root.read_column<double>(column.name, count);
+        for (std::size_t i = 0; i < count; ++i)
+            track.tips[i].*column.value = values[i];
+    }
+    for (const LoadColumn& column : load_columns)
+        if (root.has(column.name))
+            track.*column.values = root.read_column<double>(column.name, count);
+    return track;
+}
+
+}  // namespace crampfit

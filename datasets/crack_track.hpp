@@ -1,0 +1,60 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "datasets/scene.hpp"
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// Whether a tip was found in an image.
+enum class TipStatus : std::uint8_t {
+    ok,
+    too_few_points,  // of the image were followed
+    no_crack,        // a field without a crack describes the displacements as well
+    outside,         // the crack's tip is not in the picture
+};
+
+inline constexpr std::size_t tip_status_count = 4;
+
+/// In words, as the table `series` prints it.
+const char* name(TipStatus status);
+
+/// The tip of a crack in one image, at the place that its material has in the reference. Numbers are not a number
+/// unless `ok`.
+struct CrackTip {
+    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    TipStatus status = TipStatus::no_crack;
+    Vec2 tip{unknown, unknown};  // x right, y down, from the centre of the picture's first pixel [px]
+    double angle = unknown;      // in which the crack points, clockwise as seen, from +x [rad]
+    double length = unknown;     // from where the crack's line enters the picture to the tip [px]
+    double sigma = unknown;      // standard error of the length [px]
+};
+
+/// Crack tip and crack length in a series of images, with what else is known of their times.
+struct CrackTrack {
+    std::string reference;
+    std::vector<std::string> images;
+    std::optional<double> pixel;       // edge of a pixel, where it was told [m]
+    std::vector<CrackTip> tips;        // of each image
+    std::vector<double> time;          // of each image, or empty [s]
+    std::vector<double> displacement;  // of the loading then, or empty [m]; not a number outside the load's record
+    std::vector<double> force;         // of the loading then, or empty [N]; likewise
+};
+
+/// Displacement and force at the images' times, from the curves of a test on the same clock, linearly between its rows.
+/// Throws InputError, naming `file`, for curves without a time that rises or without anything beside it.
+void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file);
+
+/// What a fit takes as an experiment's data: time, displacement, force and crack length as far as they are known.
+Curves curves_of(const CrackTrack& track);
+
+void write(const CrackTrack& track, const std::filesystem::path& file);
+CrackTrack read_crack_track(const std::filesystem::path& file);
+
+}  // namespace crampfit

@@ -1,0 +1,311 @@
+#include "imaging/crack_tip.hpp"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+namespace crampfit {
+namespace {
+
+constexpr int terms = 14;         // of the series, for each component
+constexpr int smooth_terms = 10;  // of a polynomial of third degree
+constexpr double unit = 100;      // length that r is counted in, so that the terms are of like size [px]
+constexpr int scan_points = 500;  // of the field that take part in the coarse search
+constexpr int scan_places = 13;   // along the longer side of the field
+constexpr int scan_angles = 16;   // around the circle
+constexpr int ring_subsets = 6;   // outer radius of the ring about the tip, in subsets
+constexpr int least_points = 60;  // four times the series' coefficients
+// Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
+// without a crack reach some 10.
+constexpr double least_gain = 50;
+
+// Of the search for the tip.
+constexpr int most_iterations = 40;
+constexpr double difference_step = 0.1;  // [px]
+constexpr double longest_step = 30;      // [px]
+constexpr double settled = 1e-3;         // [px]
+constexpr double most_damping = 1e8;
+constexpr double as_good = 1.1;  // a score by that factor above the best may be chance
+
+using Term = Eigen::RowVector<double, terms>;
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, terms>;
+using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 2>;
+
+struct Sample {
+    Vec2 place;         // [px]
+    Vec2 displacement;  // [px]
+};
+
+/// A straight crack: its tip and the direction that it points in.
+struct Line {
+    Vec2 tip;
+    double angle;
+
+    Vec2 direction() const { return {std::cos(angle), std::sin(angle)}; }
+    Vec2 local(const Vec2& place) const {
+        const Vec2 d = direction(), offset = place - tip;
+        return {d.dot(offset), d.x() * offset.y() - d.y() * offset.x()};
+    }
+};
+
+/// All terms of the series at a place, the tip at the origin and the crack along the negative x axis.
+Term series(const Vec2& place) {
+    const double r = place.norm() / unit;
+    if (r == 0)
+        return Term::Zero();
+    // cos and sin of theta, theta / 2 and 3 theta / 2 without an angle: half angles by their squares, others by sums.
+    const double c = place.x() / (r * unit), s = place.y() / (r * unit);
+    const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)),
+                 sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
+    const double c3 = c * ch - s * sh, s3 = s * ch + c * sh;
+    const double root = std::sqrt(r), root3 = r * root;
+    return {1,
+            root * ch,
+            root * sh,
+            root * c3,
+            root * s3,
+            r * c,
+            r * s,
+            root3 * c3,
+            root3 * s3,
+            root3 * ch,
+            root3 * sh,
+            r * r,
+            r * r * (c * c - s * s),
+            2 * r * r * c * s};
+}
+
+/// Half the width of the strip about a crack in which subsets reach over it [px].
+double clearance(int subset, double angle) {
+    return 0.5 * subset * (std::abs(std::cos(angle)) + std::abs(std::sin(angle))) + 1;
+}
+
+/// Whether a subset reaches over the crack or its tip; `local` is its place from the tip.
+bool reaches_over(const Vec2& local, double width) {
+    return local.norm() < width || (local.x() < 0 && std::abs(local.y()) < width);
+}
+
+std::vector<Sample> within(const std::vector<Sample>& samples, const Vec2& tip, double radius) {
+    std::vector<Sample> near;
+    std::ranges::copy_if(samples, std::back_inserter(near),
+                         [&](const Sample& sample) { return (sample.place - tip).norm() < radius; });
+    return near;
+}
+
+/// Samples whose subsets reach neither over the crack nor over its tip.
+std::vector<Sample> clear_of(const std::vector<Sample>& samples, const Line& line, int subset) {
+    const double width = clearance(subset, line.angle);
+    std::vector<Sample> clear;
+    std::ranges::copy_if(samples, std::back_inserter(clear),
+                         [&](const Sample& sample) { return !reaches_over(line.local(sample.place), width); });
+    return clear;
+}
+
+/// What the series with its best coefficients leaves of the displacements [px].
+Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
+    Rows rows(samples.size(), terms);
+    Displacements right(samples.size(), 2);
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+        const Sample& sample = samples[static_cast<std::size_t>(i)];
+        rows.row(i) = series(line.local(sample.place));
+        right.row(i) = sample.displacement.transpose();
+    }
+    return right - rows * rows.householderQr().solve(right);
+}
+
+/// Mean square of what is left, for each degree of freedom [px^2]; by normal equations, quick and exact enough to
+/// compare. Points nearer to the tip than `about_tip` and to the crack than `about_crack` take no part [px].
+double scan_score(const std::vector<Sample>& samples, const Line& line, double about_tip, double about_crack) {
+    Eigen::Matrix<double, terms, terms> normal = Eigen::Matrix<double, terms, terms>::Zero();
+    Eigen::Matrix<double, terms, 2> right = Eigen::Matrix<double, terms, 2>::Zero();
+    double squares = 0;
+    int count = 0;
+    for (const Sample& sample : samples) {
+        const Vec2 local = line.local(sample.place);
+        if (local.norm() < about_tip || (local.x() < 0 && std::abs(local.y()) < about_crack))
+            continue;
+        const Term term = series(local);
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(term.transpose());
+        right += term.transpose() * sample.displacement.transpose();
+        squares += sample.displacement.squaredNorm();
+        ++count;
+    }
+    if (count < least_points)
+        return std::numeric_limits<double>::infinity();
+    const auto factor = normal.selfadjointView<Eigen::Lower>().ldlt();
+    const double left = squares - right.cwiseProduct(factor.solve(right)).sum();
+    return std::isfinite(left) ? left / (2 * (count - terms)) : std::numeric_limits<double>::infinity();
+}
+
+/// The best of a coarse grid of tips and directions.
+Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subset) {
+    std::vector<Sample> samples;
+    const std::size_t every = std::max<std::size_t>(1, all.size() / scan_points);
+    for (std::size_t i = every / 2; i < all.size(); i += every)
+        samples.push_back(all[i]);
+    // The score is a small difference of large sums: the mean motion says nothing and is taken off.
+    Vec2 mean = Vec2::Zero();
+    for (const Sample& sample : samples)
+        mean += sample.displacement / static_cast<double>(samples.size());
+    for (Sample& sample : samples)
+        sample.displacement -= mean;
+
+    const double across = lattice.step * (lattice.columns - 1), down = lattice.step * (lattice.rows - 1);
+    const double spacing = std::max({across, down, 1.0}) / scan_places;
+    Line best{{0, 0}, 0};
+    double least = std::numeric_limits<double>::infinity();
+    for (double y = spacing / 2; y < down; y += spacing)
+        for (double x = spacing / 2; x < across; x += spacing)
+            for (int turn = 0; turn < scan_angles; ++turn) {
+                const Line line{{lattice.first_x + x, lattice.first_y + y}, 2 * std::numbers::pi * turn / scan_angles};
+                const double width = clearance(subset, line.angle);
+                if (const double score = scan_score(samples, line, width, width); score < least) {
+                    least = score;
+                    best = line;
+                }
+            }
+    return best;
+}
+
+/// Turns the line to where the points beside it agree best. The series as a whole is the same for any direction, but a
+/// point on the wrong side of the crack is not. Here subsets that reach over the crack take part, so that no direction
+/// can hide such points in a strip; the direction is the middle of those that are about as good as the best, as no
+/// point may lie between them.
+void turn(const std::vector<Sample>& samples, Line& line, int subset, double range, double step) {
+    const int count = static_cast<int>(std::lround(2 * range / step)) + 1;
+    std::vector<double> scores;
+    for (int i = 0; i < count; ++i)
+        scores.push_back(
+            scan_score(samples, {line.tip, line.angle - range + i * step}, clearance(subset, line.angle), 0));
+    const auto best = static_cast<int>(std::ranges::min_element(scores) - scores.begin());
+    const double good = as_good * scores[static_cast<std::size_t>(best)];
+    int first = best, last = best;
+    while (first > 0 && scores[static_cast<std::size_t>(first - 1)] <= good)
+        --first;
+    while (last + 1 < count && scores[static_cast<std::size_t>(last + 1)] <= good)
+        ++last;
+    line.angle += (first + last) * step / 2 - range;
+}
+
+/// Levenberg-Marquardt over the tip, the coefficients of the series eliminated (variable projection, Golub and Pereyra
+/// 1973), derivatives by central differences. Gives the tip's covariance, were the displacements independent [px^2].
+Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
+    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd {
+        return residuals(samples, {tip, line.angle}).reshaped();
+    };
+    Eigen::VectorXd now = left(line.tip);
+    double damping = 1e-3;
+    Eigen::Matrix2d normal;
+    for (int iteration = 0; iteration < most_iterations; ++iteration) {
+        Eigen::MatrixX2d jacobian(now.size(), 2);
+        for (int i = 0; i < 2; ++i) {
+            const Vec2 step = difference_step * Vec2::Unit(i);
+            jacobian.col(i) = (left(line.tip + step) - left(line.tip - step)) / (2 * difference_step);
+        }
+        normal = jacobian.transpose() * jacobian;
+        Eigen::Matrix2d damped = normal;
+        damped.diagonal() *= 1 + damping;
+        const Vec2 step = -damped.ldlt().solve(jacobian.transpose() * now);
+        if (!step.allFinite() || step.norm() < settled || damping > most_damping)
+            break;
+        const Vec2 tip = line.tip + step * std::min(1.0, longest_step / step.norm());
+        const Eigen::VectorXd then = left(tip);
+        if (then.squaredNorm() < now.squaredNorm()) {
+            line.tip = tip;
+            now = then;
+            damping *= 0.2;
+        } else {
+            damping *= 8;
+        }
+    }
+    return now.squaredNorm() / static_cast<double>(now.size() - 2 * terms - 2) * normal.inverse();
+}
+
+/// How much better the series is than a polynomial: F statistic of what its jump and singularity take off.
+double gain(const std::vector<Sample>& samples, const Line& line) {
+    Eigen::Matrix<double, Eigen::Dynamic, smooth_terms> rows(samples.size(), smooth_terms);
+    Displacements right(samples.size(), 2);
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+        const Sample& sample = samples[static_cast<std::size_t>(i)];
+        const Vec2 p = line.local(sample.place) / unit;
+        const double x = p.x(), y = p.y();
+        rows.row(i) << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
+        right.row(i) = sample.displacement.transpose();
+    }
+    const double smooth = (right - rows * rows.householderQr().solve(right)).squaredNorm();
+    const double cracked = residuals(samples, line).squaredNorm();
+    const double freedom = 2.0 * static_cast<double>(rows.rows() - terms);
+    return (smooth - cracked) / (2 * (terms - smooth_terms)) / (cracked / freedom);
+}
+
+/// Length of the crack's line from the picture's border to the tip [px].
+double length_in_picture(const Line& line, int columns, int rows) {
+    const Vec2 back = -line.direction();
+    double length = std::numeric_limits<double>::infinity();
+    const auto to_side = [&](double from, double along, double high) {
+        if (along != 0)
+            length = std::min(length, ((along > 0 ? high : -0.5) - from) / along);
+    };
+    to_side(line.tip.x(), back.x(), columns - 0.5);
+    to_side(line.tip.y(), back.y(), rows - 0.5);
+    return length;
+}
+
+}  // namespace
+
+CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field) {
+    const PointLattice& lattice = geometry.lattice;
+    std::vector<Sample> samples;
+    for (int point = 0; point < lattice.count(); ++point)
+        if (const auto i = static_cast<std::size_t>(point); field.status[i] == PointStatus::ok)
+            samples.push_back({Vec2(lattice.x(point), lattice.y(point)), Vec2(field.u[i], field.v[i])});
+    CrackTip found;
+    found.status = TipStatus::too_few_points;
+    if (static_cast<int>(samples.size()) < 2 * least_points)
+        return found;
+
+    Line line = scan(samples, lattice, geometry.subset);
+    Eigen::Matrix2d covariance;
+    // The points that take part depend on the line, and the line on them: a few rounds, first over all, then over the
+    // ring.
+    constexpr double everywhere = std::numeric_limits<double>::infinity();
+    const double ring = ring_subsets * geometry.subset;
+    constexpr double degree = std::numbers::pi / 180;
+    for (const auto& [radius, range] :
+         {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
+        turn(within(samples, line.tip, radius), line, geometry.subset, range, range / 12);
+        const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, geometry.subset);
+        if (static_cast<int>(clear.size()) < least_points)
+            return found;
+        covariance = refine(clear, line);
+    }
+    const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 &&
+                        line.tip.y() <= geometry.rows - 1;
+    const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
+    if (static_cast<int>(clear.size()) < least_points)
+        return found;
+    if (!(gain(clear, line) > least_gain)) {
+        found.status = TipStatus::no_crack;
+        return found;
+    }
+    if (!inside) {
+        found.status = TipStatus::outside;
+        return found;
+    }
+    // Neighbouring subsets see the same pixels: as many points are independent as subsets lie side by side.
+    const double overlap = std::max(1.0, std::pow(static_cast<double>(geometry.subset) / lattice.step, 2));
+    const Vec2 d = line.direction();
+    found.status = TipStatus::ok;
+    found.tip = line.tip;
+    found.angle = std::remainder(line.angle, 2 * std::numbers::pi);
+    found.length = length_in_picture(line, geometry.columns, geometry.rows);
+    found.sigma = std::sqrt(overlap * d.dot(covariance * d));
+    return found;
+}
+
+}  // namespace crampfit

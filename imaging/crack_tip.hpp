@@ -1,0 +1,26 @@
+#pragma once
+
+#include "datasets/crack_track.hpp"
+#include "datasets/displacement_field.hpp"
+
+namespace crampfit {
+
+/// The picture that a field was measured on, as far as finding a tip needs it.
+struct FieldGeometry {
+    PointLattice lattice;
+    int subset = 0;   // edge [px]
+    int columns = 0;  // of the picture [px]
+    int rows = 0;
+};
+
+/// Finds the tip of a straight crack that has entered the picture from one of its sides. Around the tip of a crack the
+/// displacement is a series in r^(n/2), r the distance from the tip (Williams 1957, eq. 22 and what follows): for each
+/// n the angular functions are cos and sin of n theta / 2 and of (n / 2 - 2) theta, and only those of odd n jump across
+/// the crack. Each component of the displacement is given all of them up to n = 4 by itself, so that no elastic
+/// constant is needed and orthotropic wood fits about as well. The place of the tip and the crack's direction are what
+/// leaves the smallest sum of squares: sought on a coarse grid over the whole field, then in turn by finer angles and
+/// by Levenberg-Marquardt for the tip, at last over a disc around it. Subsets that reach over the crack or the tip take
+/// no part.
+CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field);
+
+}  // namespace crampfit

@@ -1,0 +1,101 @@
+#include "imaging/virtual_camera.hpp"
+
+#include "datasets/error.hpp"
+#include "imaging/random_field.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr double border = 100;         // of pattern around the picture, to move into it [px]
+constexpr int most_trials = 200;       // of the search for where a place came from
+constexpr double close_enough = 1e-9;  // [px]
+
+enum Stream : std::uint64_t { spot_x, spot_y, spot_strength, first_noise };
+
+/// The place x that has moved to `seen`: the fixed point of x = seen - u(x), which contracts as the gradient of u is
+/// below
+/// 1. In an open crack either side points to the other, and there is none.
+std::optional<Vec2> origin_of(const Vec2& seen, const PlaneDisplacement& displacement) {
+    Vec2 place = seen;
+    for (int i = 0; i < most_trials; ++i) {
+        const Vec2 next = seen - displacement(place);
+        if ((next - place).squaredNorm() < close_enough * close_enough)
+            return next;
+        place = next;
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+void VirtualCameraOptions::validate() const {
+    const auto require = [](bool holds, const char* option, double value, const char* rule) {
+        if (!holds)
+            throw InputError("virtual camera", option, fmt::format("{}", value), rule);
+    };
+    require(columns > 0 && columns <= 16384, "columns", columns, "must be from 1 to 16384");
+    require(rows > 0 && rows <= 16384, "rows", rows, "must be from 1 to 16384");
+    require(spot_radius >= 0.5 && spot_radius <= 100, "spot_radius", spot_radius, "must be from 0.5 to 100 pixels");
+    require(mean >= 0 && mean <= 255, "mean", mean, "must be from 0 to 255");
+    require(contrast > 0 && contrast <= 255, "contrast", contrast, "must be above 0, and 255 at most");
+    require(noise >= 0 && noise <= 255, "noise", noise, "must be from 0 to 255");
+    require(gap_gray >= 0 && gap_gray <= 255, "gap_gray", gap_gray, "must be from 0 to 255");
+}
+
+VirtualCamera::VirtualCamera(const VirtualCameraOptions& options) : options_(options), cell_(2 * options.spot_radius) {
+    options.validate();
+    const RandomField random(options.seed);
+    cells_across_ = static_cast<int>(std::ceil((options.columns + 2 * border) / cell_));
+    const int cells_down = static_cast<int>(std::ceil((options.rows + 2 * border) / cell_));
+    // Spots of strength a, one in a square of edge c, leave a variance of a^2 pi radius^2 / c^2.
+    const double strength = options.contrast * cell_ / (options.spot_radius * std::sqrt(std::numbers::pi));
+    for (int row = 0; row < cells_down; ++row)
+        for (int column = 0; column < cells_across_; ++column) {
+            const std::uint64_t index = spots_.size();
+            spots_.push_back({static_cast<float>((column + random.uniform(spot_x, index)) * cell_ - border),
+                              static_cast<float>((row + random.uniform(spot_y, index)) * cell_ - border),
+                              static_cast<float>(strength * random.normal(spot_strength, index))});
+        }
+}
+
+double VirtualCamera::pattern(const Vec2& place) const {
+    constexpr int reach = 3;  // squares: six radii, where a spot is 1e-8 of its strength
+    const int column = static_cast<int>(std::floor((place.x() + border) / cell_));
+    const int row = static_cast<int>(std::floor((place.y() + border) / cell_));
+    const int cells_down = static_cast<int>(spots_.size()) / cells_across_;
+    const double falloff = 1 / (2 * options_.spot_radius * options_.spot_radius);
+    double gray = options_.mean;
+    for (int j = std::max(0, row - reach); j <= std::min(cells_down - 1, row + reach); ++j)
+        for (int i = std::max(0, column - reach); i <= std::min(cells_across_ - 1, column + reach); ++i) {
+            const Spot& spot = spots_[static_cast<std::size_t>(j * cells_across_ + i)];
+            const double dx = place.x() - static_cast<double>(spot.x), dy = place.y() - static_cast<double>(spot.y);
+            gray += static_cast<double>(spot.strength) * std::exp(-falloff * (dx * dx + dy * dy));
+        }
+    return gray;
+}
+
+GrayPicture VirtualCamera::photograph(std::uint64_t shot) const {
+    return photograph([](const Vec2&) { return Vec2(0, 0); }, shot);
+}
+
+GrayPicture VirtualCamera::photograph(const PlaneDisplacement& displacement, std::uint64_t shot) const {
+    const RandomField random(options_.seed);
+    GrayPicture picture{options_.columns, options_.rows, {}};
+    for (int y = 0; y < options_.rows; ++y)
+        for (int x = 0; x < options_.columns; ++x) {
+            const std::optional<Vec2> origin = origin_of(Vec2(x, y), displacement);
+            const double noise = options_.noise * random.normal(first_noise + shot, picture.gray.size());
+            const double gray = (origin ? pattern(*origin) : options_.gap_gray) + noise;
+            picture.gray.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(gray, 0.0, 255.0))));
+        }
+    return picture;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,56 @@
+#pragma once
+
+#include "datasets/scene.hpp"
+#include "imaging/gray_picture.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace crampfit {
+
+/// A speckled specimen and the camera that looks at it. Lengths are pixels; x runs to the right and y down.
+struct VirtualCameraOptions {
+    int columns = 512;
+    int rows = 512;
+    double spot_radius = 1.6;  // standard deviation of a Gaussian spot, the lens's blur included [px]
+    double mean = 128;         // gray
+    double contrast = 35;      // standard deviation of the pattern's gray
+    double noise = 1;          // standard deviation of each pixel's gray, anew in each picture
+    double gap_gray = 10;      // where a crack lets one see through
+    std::uint64_t seed = 1;
+
+    /// Throws InputError naming the option, its value and the rule that it breaks.
+    void validate() const;
+};
+
+/// Displacement of the material point that lies at a place of the reference picture [px].
+using PlaneDisplacement = std::function<Vec2(const Vec2&)>;
+
+/// Photographs a speckle pattern that moves with a given displacement. The pattern is a sum of Gaussian spots at random
+/// places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and
+/// the rounding to whole grays.
+class VirtualCamera {
+  public:
+    /// Throws InputError for bad options.
+    explicit VirtualCamera(const VirtualCameraOptions& options);
+
+    /// The picture of the pattern at rest; `shot` numbers the picture: another number, other noise.
+    GrayPicture photograph(std::uint64_t shot) const;
+
+    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1.
+    GrayPicture photograph(const PlaneDisplacement& displacement, std::uint64_t shot) const;
+
+  private:
+    struct Spot {
+        float x, y, strength;  // [px], gray
+    };
+    double pattern(const Vec2& place) const;
+
+    VirtualCameraOptions options_;
+    double cell_;  // edge of a square that holds one spot [px]
+    int cells_across_ = 0;
+    std::vector<Spot> spots_;  // [cells down x cells across], from `border` outside the picture on
+};
+
+}  // namespace crampfit

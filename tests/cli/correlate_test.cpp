@@ -1,0 +1,181 @@
+// `crampfit correlate` and `crampfit track`, as a user runs them.
+#include "tests/cli/pictures.hpp"
+#include "tests/imaging/plane_fields.hpp"
+
+#include "datasets/io.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <sstream>
+
+using namespace crampfit;
+
+namespace {
+
+std::vector<std::map<std::string, std::string>> rows_of(const std::string& csv) {
+    const auto fields = [](const std::string& line) {
+        std::vector<std::string> parts;
+        std::istringstream in(line);
+        for (std::string part; std::getline(in, part, ',');)
+            parts.push_back(part);
+        return parts;
+    };
+    std::istringstream lines(csv);
+    std::string line;
+    std::getline(lines, line);
+    const std::vector<std::string> names = fields(line);
+    std::vector<std::map<std::string, std::string>> rows;
+    while (std::getline(lines, line)) {
+        const std::vector<std::string> values = fields(line);
+        for (std::size_t i = 0; i < names.size(); ++i)
+            (i == 0 ? rows.emplace_back() : rows.back())[names[i]] = values.at(i);
+    }
+    return rows;
+}
+
+const VirtualCamera& camera() {
+    static const VirtualCamera one({.columns = 240, .rows = 200});
+    return one;
+}
+
+std::string big_endian(std::uint32_t value) {
+    std::string bytes;
+    for (const int shift : {24, 16, 8, 0})
+        bytes += static_cast<char>(value >> shift & 0xff);
+    return bytes;
+}
+
+}  // namespace
+
+TEST(SystemCorrelate, PointsOfASeries) {
+    Command command;
+    const std::string reference = write_pgm(command, "0.pgm", camera().photograph(0));
+    std::vector<std::string> words{"correlate", reference};
+    for (const double shift : {0.5, 3.25})
+        words.push_back(write_pgm(command, std::to_string(shift) + ".pgm",
+                                  camera().photograph([=](const Vec2&) { return Vec2(shift, -2 * shift); }, 1)));
+    for (const char* word : {"-o", "field.h5", "--pixel", "10 um", "--threads", "1"})
+        words.push_back(word == std::string("field.h5") ? command.path(word) : word);
+    words.insert(words.end(), {"--preview", command.path("preview.png"), "--step", "20"});
+    const Outcome outcome = command.run(words);
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_GT(command.folder.read("preview.png").size(), 1000u);
+    const std::string csv = command.run({"csv", command.path("field.h5"), "points"}).out;
+    EXPECT_EQ(csv.substr(0, csv.find('\n')), "image,x_px,y_px,u_px,v_px,exx,eyy,exy,zncc,sigma_px,status");
+    int followed = 0;
+    for (auto& row : rows_of(csv)) {
+        const double shift = row["image"] == "0" ? 0.5 : 3.25;
+        if (row["status"] != "ok") {
+            EXPECT_EQ(row["u_px"], "nan");
+            continue;
+        }
+        ++followed;
+        EXPECT_NEAR(std::stod(row["u_px"]), shift, 0.03);
+        EXPECT_NEAR(std::stod(row["v_px"]), -2 * shift, 0.03);
+        EXPECT_NEAR(std::stod(row["exx"]), 0, 1e-3);
+    }
+    EXPECT_GT(followed, 2 * 50);
+    EXPECT_TRUE(contains(command.run({"csv", command.path("field.h5"), "images"}).out, "1,"));
+}
+
+TEST(SystemCorrelate, BadPicturesAreNamed) {
+    Command command;
+    const std::string good = write_pgm(command, "good.pgm", camera().photograph(0));
+    const std::string whole = command.folder.read("good.pgm");
+    const auto file = [&](const char* name, const std::string& bytes) {
+        return command.folder.write(name, bytes).string();
+    };
+    const std::string black(240 * 200, '\0');
+    const std::string huge = "P5\n30000 30000\n255\n";
+    const std::map<std::string, std::string> bad{
+        {file("empty.pgm", ""), "empty"},
+        {file("one.pgm", "P5\n1 1\n255\nx"), ""},
+        {file("black.pgm", "P5\n240 200\n255\n" + black), "gray 0 only"},
+        {file("short.pgm", whole.substr(0, whole.size() / 2)), "cut short"},
+        {file("huge.pgm", huge), "2^28 pixels"},
+        {file("huge.png", "\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR", 8) + big_endian(30000) + big_endian(30000)),
+         "cut short"},
+        {file("text.png", "no picture"), "no picture"},
+        {write_pgm(command, "small.pgm", VirtualCamera({.columns = 239, .rows = 200}).photograph(0)), "one size"},
+        {command.path("missing.png"), "no such file"},
+    };
+    for (const auto& [name, rule] : bad) {
+        for (const char* verb : {"correlate", "track"}) {
+            const Outcome outcome = command.run({verb, good, good, name, "-o", command.path("out.h5")});
+            EXPECT_EQ(outcome.status, 2) << name;
+            EXPECT_TRUE(contains(outcome.error, name)) << outcome.error;
+            EXPECT_TRUE(contains(outcome.error, rule)) << outcome.error;
+        }
+        EXPECT_EQ(command.run({"correlate", name, good, "-o", command.path("out.h5")}).status, 2) << name;
+    }
+    EXPECT_EQ(command.run({"correlate", good, good, "-o", good}).status, 2);
+    EXPECT_EQ(command.run({"correlate", good, good, "-o", command.path("out.h5"), "--pixel", "10"}).status, 2);
+    EXPECT_EQ(command.run({"correlate", good, good, "-o", command.path("out.h5"), "--set", "a=1"}).status, 2);
+    EXPECT_FALSE(std::filesystem::exists(command.path("out.h5")));
+}
+
+TEST(SystemTrack, SeriesAndExperiment) {
+    Command command;
+    std::vector<std::string> words{"track", write_pgm(command, "0.pgm", camera().photograph(0))};
+    const std::vector<double> tips{90, 110, 130};
+    for (std::size_t i = 0; i < tips.size(); ++i)
+        words.push_back(write_pgm(command, std::to_string(i + 1) + ".pgm",
+                                  camera().photograph(crack_field({tips[i], 100.2}, 0, 3, 0), i + 1)));
+    words.push_back(write_pgm(command, "4.pgm", camera().photograph(4)));  // nothing has moved
+    const std::string times = command.folder.write("times.csv", "time [s]\n1\n2\n3\n4\n").string();
+    const std::string load =
+        command.folder.write("load.csv", "time [s],force [N],displacement [mm]\n0,0,0\n2,10,0.2\n3.5,40,0.35\n")
+            .string();
+    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--times", times, "--load", load,
+                               "--preview", command.path("p.png")});
+    const Outcome outcome = command.run(words);
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_GT(command.folder.read("p.png").size(), 1000u);
+    const std::string csv = command.run({"csv", command.path("track.h5"), "series"}).out;
+    EXPECT_EQ(csv.substr(0, csv.find('\n')), "image,time_s,tip_x_px,tip_y_px,crack_length_m,sigma_m,status");
+    auto rows = rows_of(csv);
+    ASSERT_EQ(rows.size(), 4u);
+    for (std::size_t i = 0; i < tips.size(); ++i) {
+        EXPECT_EQ(rows[i]["status"], "ok");
+        EXPECT_EQ(std::stod(rows[i]["time_s"]), static_cast<double>(i + 1));
+        EXPECT_NEAR(std::stod(rows[i]["tip_x_px"]), tips[i], 5);
+        EXPECT_NEAR(std::stod(rows[i]["tip_y_px"]), 100.2, 5);
+        EXPECT_NEAR(std::stod(rows[i]["crack_length_m"]), (tips[i] + 0.5) * 20e-6, 5 * 20e-6);
+    }
+    EXPECT_EQ(rows[3]["status"], "no crack");
+    EXPECT_EQ(rows[3]["tip_x_px"], "nan");
+
+    const auto data =
+        command.folder.write("experiment.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out);
+    const Curves curves = read_curves(data);
+    ASSERT_EQ(curves.time.size(), 4u);
+    EXPECT_NEAR(curves.force[0], 5, 1e-9);
+    EXPECT_NEAR(curves.force[2], 30, 1e-9);
+    EXPECT_NEAR(curves.displacement[2], 0.3e-3, 1e-12);
+    EXPECT_TRUE(std::isnan(curves.force[3]));  // after the load's end
+    EXPECT_NEAR(curves.crack_length[1], 110.5 * 20e-6, 5 * 20e-6);
+    EXPECT_TRUE(std::isnan(curves.crack_length[3]));
+}
+
+TEST(SystemTrack, BadTimesAndLoad) {
+    Command command;
+    const std::string good = write_pgm(command, "0.pgm", camera().photograph(0));
+    const auto refused = [&](const std::vector<std::string>& more, const std::string& phrase) {
+        std::vector<std::string> words{"track", good, good, "-o", command.path("track.h5")};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << phrase;
+        EXPECT_TRUE(contains(outcome.error, phrase)) << outcome.error;
+    };
+    const auto file = [&](const char* name, const char* text) { return command.folder.write(name, text).string(); };
+    refused({"--times", file("two.csv", "time [s]\n1\n2\n")}, "2 rows");
+    refused({"--times", file("force.csv", "force [N]\n1\n")}, "0 rows");
+    const std::string times = file("times.csv", "time [s]\n1\n");
+    refused({"--load", file("load.csv", "time [s],force [N]\n0,1\n2,1\n")}, "--times");
+    refused({"--times", times, "--load", file("fall.csv", "time [s],force [N]\n2,1\n0,1\n")}, "must rise");
+    refused({"--times", times, "--load", file("bare.csv", "time [s]\n0\n2\n")}, "displacement or force");
+    refused({"--times", times, "--load", file("late.csv", "force [N]\n0\n2\n")}, "needs its time");
+}
