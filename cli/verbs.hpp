@@ -17,6 +17,7 @@ struct Verb {
 Verb simulate_verb(CLI::App& command, const CommonOptions& common);
 Verb explain_verb(CLI::App& command, const CommonOptions& common);
 Verb fit_verb(CLI::App& command, const CommonOptions& common);
+Verb sensitivity_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
 
 }  // namespace crampfit::cli

@@ -178,6 +178,38 @@ std::vector<Offer> offers(const Fit& fit) {
             {"correlation", [&] { return correlation_table(fit); }}};
 }
 
+// ---- tables of a sensitivity study
+
+Table indices_table(const Sensitivity& sensitivity) {
+    Table table{{"output", "parameter", "method", "value", "lower_95", "upper_95", "kind"}};
+    for (const SensitivityIndex& index : sensitivity.indices)
+        table.push_back({index.output, index.parameter, index.method, text_of(index.value), text_of(index.lower_95),
+                         text_of(index.upper_95), index.kind});
+    return table;
+}
+
+Table runs_table(const Sensitivity& sensitivity) {
+    Table table(1);
+    for (const StudiedParameter& parameter : sensitivity.parameters)
+        table.front().push_back(parameter.name);
+    for (const StudiedOutput& output : sensitivity.outputs)
+        table.front().push_back(output.name);
+    table.front().insert(table.front().end(), {"status", "seconds"});
+    for (const SensitivityRun& run : sensitivity.runs) {
+        Row& row = table.emplace_back();
+        for (const double value : run.parameters)
+            row.push_back(text_of(value));
+        for (const double value : run.outputs)
+            row.push_back(text_of(value));
+        row.insert(row.end(), {run.status, text_of(run.seconds)});
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const Sensitivity& sensitivity) {
+    return {{"indices", [&] { return indices_table(sensitivity); }}, {"runs", [&] { return runs_table(sensitivity); }}};
+}
+
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
                   std::ostream& out) {
     std::vector<std::string> names;
@@ -201,6 +233,9 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     } else if (kind == "fit") {
         const Fit fit = read_fit(file);
         print_one_of(offers(fit), file, table, out);
+    } else if (kind == "sensitivity") {
+        const Sensitivity sensitivity = read_sensitivity(file);
+        print_one_of(offers(sensitivity), file, table, out);
     } else {
         print_one_of({}, file, table, out);
     }

@@ -29,23 +29,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// All keys that a study changes.
-std::vector<std::string> keys_of(const Study& study) {
-    std::vector<std::string> keys;
-    for (const Parameter& parameter : study.parameters) {
-        keys.insert(keys.end(), parameter.keys.begin(), parameter.keys.end());
-    }
-    return keys;
-}
-
-std::vector<double> in_units(const UnitBox& box, const Eigen::VectorXd& x) {
-    std::vector<double> values;
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        values.push_back(box.value(j, x[j]) / box.parameters()[static_cast<std::size_t>(j)].unit_factor);
-    }
-    return values;
-}
-
 /// Tells the caller after each run where the fit stands.
 class Reporter {
   public:

@@ -2,8 +2,7 @@
 
 #include "datasets/experiment.hpp"
 #include "datasets/fit.hpp"
-#include "datasets/record.hpp"
-#include "datasets/scene.hpp"
+#include "inverse/forward.hpp"
 
 #include <atomic>
 #include <functional>
@@ -21,10 +20,6 @@ struct FitProgress {
     std::string stage;         // what is going on, in a word or two: "starts", "descent", "polish", "uncertainty"
     double seconds = 0;        // since the fit began [s]
 };
-
-/// One simulation of one scene. `stop` is set when the user interrupts; it may be null. Called from several threads at
-/// a time.
-using Forward = std::function<Record(const Scene& scene, const std::atomic<bool>* stop)>;
 
 struct FitOptions {
     int threads = 0;                                    // forward runs side by side; 0: one a core

@@ -74,4 +74,12 @@ Forward forward_with_kept_walks(const std::vector<std::string>& keys) {
     return [walks](const Scene& scene, const std::atomic<bool>* stop) { return walks->run(scene, stop); };
 }
 
+std::vector<std::string> keys_of(const Study& study) {
+    std::vector<std::string> keys;
+    for (const Parameter& parameter : study.parameters) {
+        keys.insert(keys.end(), parameter.keys.begin(), parameter.keys.end());
+    }
+    return keys;
+}
+
 }  // namespace crampfit

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "datasets/experiment.hpp"
-#include "inverse/fit.hpp"
+#include "inverse/forward.hpp"
 
 #include <string>
 #include <vector>
@@ -11,5 +11,8 @@ namespace crampfit {
 /// The forward solver as a fit calls it: runs that differ from a recent one by toughness alone share its equilibria. `keys` are all
 /// that the fit changes. May be called from several threads.
 Forward forward_with_kept_walks(const std::vector<std::string>& keys);
+
+/// All keys that a study changes.
+std::vector<std::string> keys_of(const Study& study);
 
 }  // namespace crampfit

@@ -72,4 +72,13 @@ void check_study(const Study& study) {
             std::to_string(study.uncertainty.posterior), "not supported yet; leave it out or set it to 0");
 }
 
+void check_sensitivity_study(const Study& study) {
+    require(!scenes_of(study).empty(), study, "scene", "none", "a sensitivity study needs a scene, or experiments with scenes");
+    require(!study.outputs.empty(), study, "outputs", "none", "a sensitivity study needs outputs to look at");
+    require(!study.parameters.empty(), study, "parameters", "none", "a sensitivity study needs a parameter to vary");
+    for (std::size_t i = 0; i < study.parameters.size(); ++i) {
+        check_parameter(study, study.parameters[i], i);
+    }
+}
+
 }  // namespace crampfit

@@ -199,9 +199,15 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"max_runs = 200", "max_runs = 0", "optimizer.max_runs", "whole number from 1"},
         {"profile = true", "profile = 1", "uncertainty.profile", "true or false"},
         {"posterior = 2000", "posterior = -1", "uncertainty.posterior", "whole number from 0"},
-        {"[optimizer]", "[sensitivity]\nmethod = \"sobol\"\n[optimizer]", "sensitivity", "not supported yet"},
-        {"title =", "outputs = [\"peak force\"]\ntitle =", "outputs", "not supported yet"},
-        {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "not supported yet"},
+        {"[optimizer]", "[sensitivity]\nmethod = \"sobel\"\n[optimizer]", "sensitivity.method", "did you mean \"sobol\"?"},
+        {"[optimizer]", "[sensitivity]\nsamples = 1\n[optimizer]", "sensitivity.samples", "whole number from 2"},
+        {"title =", "outputs = [\"peek force\"]\ntitle =", "outputs.0", "did you mean \"peak force\"?"},
+        {"title =", "outputs = []\ntitle =", "outputs", "at least one"},
+        {"title =", "outputs = [\"force at 3 N\"]\ntitle =", "outputs.0", "wrong dimension"},
+        {"title =", "outputs = [\"force at -1 mm\"]\ntitle =", "outputs.0", "greater than 0"},
+        {"title =", "outputs = [\"arrest length 0\"]\ntitle =", "outputs.0", "whole number from 1"},
+        {"title =", "outputs = [\"peak force\", \"peak force\"]\ntitle =", "outputs.1", "asked for twice"},
+        {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "either a scene or experiments"},
         {"title =", "title = = ", "", "line 1"},
     };
     for (const Bad& bad : table) {
