@@ -18,6 +18,7 @@ namespace {
 struct Arguments {
     std::filesystem::path study;
     std::filesystem::path output;
+    bool resume = false;
 };
 
 ExitStatus exit_status(SensitivityStatus status) {
@@ -32,12 +33,15 @@ ExitStatus exit_status(SensitivityStatus status) {
     throw std::logic_error("a sensitivity status without an exit status");
 }
 
-Sensitivity run(const Study& study, const CommonOptions& common) {
+Sensitivity run(const Study& study, const Arguments& arguments, const CommonOptions& common) {
     ProgressLine line(common, "runs");
     SensitivityOptions options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();
+    options.keeping = {arguments.output.string() + ".runs", arguments.resume};
     options.progress = [&](const SensitivityProgress& progress) {
+        if (!progress.failure.empty())
+            report(common, progress.failure);
         const double fraction = static_cast<double>(progress.runs) / std::max(1, progress.planned);
         line.show(std::min(1.0, fraction), progress.runs,
                   fmt::format("{} runs of {}, {} failed", progress.runs, progress.planned, progress.failed));
@@ -69,7 +73,7 @@ ExitStatus study_and_save(const Arguments& arguments, const CommonOptions& commo
         load_specimen(experiment.scene);
     stop_on_signals();
     spdlog::info("the study is read");
-    const Sensitivity sensitivity = run(study, common);
+    const Sensitivity sensitivity = run(study, arguments, common);
     write(sensitivity, arguments.output);
     report(common, fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,
                                duration_text(sensitivity.seconds), arguments.output.string()));
@@ -84,6 +88,7 @@ Verb sensitivity_verb(CLI::App& command, const CommonOptions& common) {
     CLI::App* verb = command.add_subcommand("sensitivity", "Local, Morris and Sobol sensitivity of the chosen outputs");
     verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();
     verb->add_option("-o,--output", arguments->output, "Where the result goes")->type_name("OUT.h5")->required();
+    verb->add_flag("--resume", arguments->resume, "Go on from the runs that an earlier call has kept beside its output");
     return {verb, [arguments, &common] { return study_and_save(*arguments, common); }};
 }
 

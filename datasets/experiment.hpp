@@ -103,6 +103,8 @@ struct Study {
     OptimizerChoice optimizer;
     UncertaintyChoice uncertainty;
     SensitivityChoice sensitivity;
+    std::optional<double> time_limit;  // of one run of one scene [s]; absent: none
+    std::vector<std::pair<std::string, std::string>> scene_settings;  // --set for the scenes, as they were given
     std::filesystem::path file;
     std::string text;
 };

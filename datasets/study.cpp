@@ -12,7 +12,7 @@ namespace crampfit {
 namespace {
 
 const std::vector<std::string> study_keys{"title",     "experiments", "scene",       "outputs",
-                                          "parameters", "optimizer",   "uncertainty", "sensitivity"};
+                                          "parameters", "optimizer",   "uncertainty", "sensitivity", "runs"};
 
 /// What --set gives, for the study itself and for all its scenes.
 struct SplitOverrides {
@@ -151,6 +151,7 @@ Study read_study(const std::filesystem::path& file, const Overrides& overrides) 
     Study study;
     study.file = file;
     study.text = document.text();
+    study.scene_settings = split.scenes;
     if (const auto title = root.find("title")) {
         study.title = title->text();
     }
@@ -174,6 +175,10 @@ Study read_study(const std::filesystem::path& file, const Overrides& overrides) 
     }
     if (const auto uncertainty = root.find("uncertainty")) {
         study.uncertainty = read_uncertainty(*uncertainty);
+    }
+    if (const auto runs = root.find("runs")) {
+        runs->only({"time_limit"});
+        study.time_limit = runs->at("time_limit").number(limits::positive(dimension::time));
     }
     return study;
 }

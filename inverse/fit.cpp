@@ -32,8 +32,9 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 /// Tells the caller after each run where the fit stands.
 class Reporter {
   public:
-    Reporter(const FitOptions& options, const UnitBox& box, int max_runs) : options_(options), box_(box) {
-        progress_.max_runs = max_runs;
+    Reporter(const FitOptions& options, const Study& study, const UnitBox& box)
+        : options_(options), study_(study), box_(box) {
+        progress_.max_runs = study.optimizer.max_runs;
         progress_.best_misfit = std::numeric_limits<double>::infinity();
     }
 
@@ -50,6 +51,7 @@ class Reporter {
             progress_.best_misfit = run.evaluation->misfit;
             progress_.best = in_units(box_, run.x);
         }
+        progress_.failure = failure_text(study_, box_.values(run.x), *run.evaluation);
         if (options_.progress) {
             options_.progress(progress_);
         }
@@ -57,6 +59,7 @@ class Reporter {
 
   private:
     const FitOptions& options_;
+    const Study& study_;
     const UnitBox& box_;
     Clock::time_point begin_ = Clock::now();
     std::mutex mutex_;
@@ -151,9 +154,12 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const StudyModel model(study, own ? forward_with_kept_walks(keys_of(study)) : options.forward, own ? solver_resolution : 0.0,
                            options.stop_requested);
     const UnitBox& box = model.box();
-    Reporter reporter(options, box, study.optimizer.max_runs);
+    Reporter reporter(options, study, box);
+    RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); },
+        box.size(), [&](const Eigen::VectorXd& x, int threads) {
+            return store.at(box.values(x), [&] { return model.evaluate(x, threads); });
+        },
         study.optimizer.max_runs, thread_count(options.threads), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 

@@ -33,6 +33,7 @@ class SceneRuns {
     std::vector<const Scene*> scenes_;
     Forward forward_;
     const std::atomic<bool>* stop_;
+    std::optional<double> time_limit_;  // [s]
     std::vector<std::vector<std::pair<Eigen::Index, std::string>>> settings_;  // parameter and key, for each scene
 };
 

@@ -249,12 +249,18 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     result.outputs = model.names();
     fill_parameters(model.box(), result);
 
-    SensitivityProgress progress{0, runs_of(study), 0};
+    SensitivityProgress progress;
+    progress.planned = runs_of(study);
+    RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
-        model.box().size(), [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); },
+        model.box().size(),
+        [&](const Eigen::VectorXd& x, int threads) {
+            return store.at(model.box().values(x), [&] { return model.evaluate(x, threads); });
+        },
         progress.planned, thread_count(options.threads), options.stop_requested, [&](const Run& run) {
             ++progress.runs;
             progress.failed += run.evaluation->usable() ? 0 : 1;
+            progress.failure = failure_text(study, model.box().values(run.x), *run.evaluation);
             if (options.progress) {
                 options.progress(progress);
             }

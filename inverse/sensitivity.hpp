@@ -3,6 +3,7 @@
 #include "datasets/experiment.hpp"
 #include "datasets/sensitivity.hpp"
 #include "inverse/forward.hpp"
+#include "inverse/run_store.hpp"
 
 #include <atomic>
 #include <functional>
@@ -13,6 +14,7 @@ struct SensitivityProgress {
     int runs = 0;    // forward runs that have ended
     int planned = 0;
     int failed = 0;
+    std::string failure;  // why the run that has just ended failed, and the command that runs it again; empty: it did not
 };
 
 struct SensitivityOptions {
@@ -21,6 +23,7 @@ struct SensitivityOptions {
     std::function<void(const SensitivityProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;          // set from outside: the study ends with what it has
     unsigned seed = 1;                                          // of everything that is drawn at random
+    RunKeeping keeping;  // of the forward runs, as they end
 
     /// Throws InputError naming the option that is out of range.
     void validate() const;
