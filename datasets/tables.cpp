@@ -171,11 +171,43 @@ Table correlation_table(const Fit& fit) {
     return table;
 }
 
+Table checks_table(const Fit& fit) {
+    Table table{{"experiment", "kind", "points", "chi_square", "p_chi_square", "autocorrelation", "p_autocorrelation"}};
+    for (const FitCheck& check : fit.checks)
+        table.push_back({check.experiment, check.kind, std::to_string(check.points), text_of(check.chi_square),
+                         text_of(check.p_chi_square), text_of(check.autocorrelation), text_of(check.p_autocorrelation)});
+    return table;
+}
+
+Table profile_table(const Fit& fit) {
+    Table table{{"parameter", "value", "misfit"}};
+    for (const ProfilePoint& point : fit.profile)
+        table.push_back({point.parameter, text_of(point.value), text_of(point.misfit)});
+    return table;
+}
+
+Table posterior_table(const Fit& fit) {
+    Table table(1);
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    table.front().push_back("misfit");
+    for (const PosteriorSample& sample : fit.posterior) {
+        Row& row = table.emplace_back();
+        for (const double value : sample.parameters)
+            row.push_back(text_of(value));
+        row.push_back(text_of(sample.misfit));
+    }
+    return table;
+}
+
 std::vector<Offer> offers(const Fit& fit) {
     return {{"parameters", [&] { return parameters_table(fit); }},
             {"runs", [&] { return runs_table(fit); }},
             {"residuals", [&] { return residuals_table(fit); }},
-            {"correlation", [&] { return correlation_table(fit); }}};
+            {"correlation", [&] { return correlation_table(fit); }},
+            {"checks", [&] { return checks_table(fit); }},
+            {"profile", [&] { return profile_table(fit); }},
+            {"posterior", [&] { return posterior_table(fit); }}};
 }
 
 // ---- tables of a sensitivity study

@@ -1,7 +1,9 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/explore.hpp"
 #include "inverse/kept_walks.hpp"
+#include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/search.hpp"
 #include "inverse/study_model.hpp"
@@ -184,17 +186,35 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         for (const Parameter& parameter : study.parameters) {
             names.push_back(parameter.name);
         }
-        const Uncertainty uncertainty = estimate_uncertainty(objective, model.curve_lengths(), names);
-        const Run& best = uncertainty.best;
+        const auto estimate = [&] { return estimate_uncertainty(objective, model.curve_lengths(), names); };
+        const auto look_around = [&](const Uncertainty& about) {
+            const bool cheap = own ? runs_share_walks(study) : options.cheap_runs;
+            const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
+            return explore(objective, about, study.uncertainty, stations, cheap, options.seed,
+                           [&](const std::string& stage) { reporter.set_stage(stage); });
+        };
+        Uncertainty uncertainty = estimate();
+        Exploration exploration = look_around(uncertainty);
+        // It may have come upon a better point. About that one, then, where it is not as good as the same.
+        const double gain = uncertainty.best.evaluation->misfit - objective.best()->evaluation->misfit;
+        if (gain > 0.02 * uncertainty.widening) {
+            objective.set_budget_left(reserve);
+            uncertainty = estimate();
+            exploration = look_around(uncertainty);
+        }
+        const Run best = *objective.best();
         fit.status = objective.stopped() ? FitStatus::interrupted
                      : found.converged   ? FitStatus::converged
                                          : FitStatus::run_limit;
         fit.message = explain(fit.status);
         fill_parameters(fit, box, best.x, uncertainty);
-        fit.message += uncertainty.message + model.remarks();
+        fit.message += uncertainty.message;
+        fill_exploration(fit, box, uncertainty, exploration);
         fit.misfit = best.evaluation->misfit;
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);
+        fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
+        fit.message += lack_of_fit(fit.checks) + model.remarks();
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);

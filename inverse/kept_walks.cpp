@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -72,6 +73,13 @@ class Walks {
 Forward forward_with_kept_walks(const std::vector<std::string>& keys) {
     auto walks = std::make_shared<Walks>(keys);
     return [walks](const Scene& scene, const std::atomic<bool>* stop) { return walks->run(scene, stop); };
+}
+
+bool runs_share_walks(const Study& study) {
+    const auto keys = keys_of(study);
+    const bool toughness = std::all_of(keys.begin(), keys.end(), [](const std::string& key) { return key.ends_with(".toughness"); });
+    const auto scenes = scenes_of(study);
+    return toughness && std::all_of(scenes.begin(), scenes.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
 }
 
 std::vector<std::string> keys_of(const Study& study) {

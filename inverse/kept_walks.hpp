@@ -12,6 +12,9 @@ namespace crampfit {
 /// that the fit changes. May be called from several threads.
 Forward forward_with_kept_walks(const std::vector<std::string>& keys);
 
+/// Whether all runs of a study are other toughnesses on walks that are kept, and cost milliseconds.
+bool runs_share_walks(const Study& study);
+
 /// All keys that a study changes.
 std::vector<std::string> keys_of(const Study& study);
 

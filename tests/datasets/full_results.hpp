@@ -103,6 +103,9 @@ inline Fit full_fit() {
     fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5},
                      {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
     fit.runs = {{{80.0, 120.0}, infinite, "unstable", 0.5}, {{103.25, not_a_number}, 12.75, "finished", 0.625}};
+    fit.checks = {{"wedge 1", "force", 50, 12.5, 1.0 / 3.0, -0.0, not_a_number}};
+    fit.profile = {{"EW, toughness", 80.5, infinite}, {"LW \"hard\"", -0.0, 1.0 / 3.0}};
+    fit.posterior = {{{80.0, 1.0 / 3.0}, 12.75}, {{infinite, -0.0}, 13.0}};
     fit.seconds = 3.25;
     fit.seed = 4000000000u;
     fit.study_text = "title = 'ü'";

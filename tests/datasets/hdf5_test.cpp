@@ -120,6 +120,23 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
         EXPECT_EQ(after.runs[i].status, before.runs[i].status);
         EXPECT_TRUE(same_bits(after.runs[i].seconds, before.runs[i].seconds));
     }
+    ASSERT_EQ(after.checks.size(), before.checks.size());
+    EXPECT_EQ(after.checks[0].experiment, before.checks[0].experiment);
+    EXPECT_EQ(after.checks[0].kind, before.checks[0].kind);
+    EXPECT_EQ(after.checks[0].points, before.checks[0].points);
+    const auto numbers = [](const FitCheck& c) {
+        return std::vector{c.chi_square, c.p_chi_square, c.autocorrelation, c.p_autocorrelation};
+    };
+    EXPECT_TRUE(same_bits(numbers(after.checks[0]), numbers(before.checks[0])));
+    ASSERT_EQ(after.profile.size(), before.profile.size());
+    ASSERT_EQ(after.posterior.size(), before.posterior.size());
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(after.profile[i].parameter, before.profile[i].parameter);
+        EXPECT_TRUE(same_bits(after.profile[i].value, before.profile[i].value));
+        EXPECT_TRUE(same_bits(after.profile[i].misfit, before.profile[i].misfit));
+        EXPECT_TRUE(same_bits(after.posterior[i].parameters, before.posterior[i].parameters));
+        EXPECT_TRUE(same_bits(after.posterior[i].misfit, before.posterior[i].misfit));
+    }
     EXPECT_TRUE(same_bits(std::vector{after.misfit, after.reduced_chi_square, after.seconds},
                           std::vector{before.misfit, before.reduced_chi_square, before.seconds}));
     EXPECT_EQ(after.seed, before.seed);
