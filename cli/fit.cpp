@@ -45,8 +45,9 @@ Fit run(const Study& study, const Arguments& arguments, const CommonOptions& com
             report(common, progress.failure);
         const double fraction = std::min(1.0, static_cast<double>(progress.runs) / std::max(1, progress.max_runs));
         line.show(fraction, progress.runs,
-                  fmt::format("{}: {} runs of {} at most, best misfit {:.4g}", progress.stage, progress.runs,
-                              progress.max_runs, progress.best_misfit));
+                  fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs,
+                              progress.runs <= progress.max_runs ? fmt::format(" of {} at most", progress.max_runs) : "",
+                              progress.best_misfit));
     };
     return fit_study(study, options);
 }

@@ -45,11 +45,8 @@ double rise_of(const Uncertainty& uncertainty) { return uncertainty.quantile * u
 Exploration explore(Objective& objective, const Uncertainty& uncertainty, const UncertaintyChoice& choice, int data_residuals,
                     bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage) {
     Exploration result;
-    if ((!choice.profile && choice.posterior == 0) || uncertainty.model_variance.size() == 0) {
-        return result;
-    }
     std::optional<Objective> polynomials = cheap ? std::nullopt : surrogate(objective, uncertainty);
-    if (!cheap && !polynomials) {
+    if (uncertainty.model_variance.size() == 0 || (!cheap && !polynomials)) {
         result.message = "Too few runs ended well near the best one for a profile or a posterior. ";
         return result;
     }

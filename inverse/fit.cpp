@@ -188,6 +188,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         }
         const auto estimate = [&] { return estimate_uncertainty(objective, model.curve_lengths(), names); };
         const auto look_around = [&](const Uncertainty& about) {
+            if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
+                return Exploration();
+            }
             const bool cheap = own ? runs_share_walks(study) : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
             return explore(objective, about, study.uncertainty, stations, cheap, options.seed,

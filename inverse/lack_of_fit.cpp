@@ -51,8 +51,8 @@ std::string lack_of_fit(const std::vector<FitCheck>& checks) {
                                 curve, std::sqrt(check.chi_square / check.points), check.p_chi_square);
         }
         if (check.p_autocorrelation < rare) {
-            text += fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}), so the model "
-                                "misses something there. ",
+            text += fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}): the model, or "
+                                "its grid, misses something there. ",
                                 curve, check.autocorrelation, check.p_autocorrelation);
         }
     }

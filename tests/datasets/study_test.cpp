@@ -200,6 +200,8 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"profile = true", "profile = 1", "uncertainty.profile", "true or false"},
         {"posterior = 2000", "posterior = -1", "uncertainty.posterior", "whole number from 0"},
         {"[optimizer]", "[sensitivity]\nmethod = \"sobel\"\n[optimizer]", "sensitivity.method", "did you mean \"sobol\"?"},
+        {"[optimizer]", "[runs]\ntime_limit = \"0 s\"\n[optimizer]", "runs.time_limit", "greater than 0"},
+        {"[optimizer]", "[runs]\n[optimizer]", "runs.time_limit", "missing"},
         {"[optimizer]", "[sensitivity]\nsamples = 1\n[optimizer]", "sensitivity.samples", "whole number from 2"},
         {"title =", "outputs = [\"peek force\"]\ntitle =", "outputs.0", "did you mean \"peak force\"?"},
         {"title =", "outputs = []\ntitle =", "outputs", "at least one"},
