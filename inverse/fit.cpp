@@ -153,7 +153,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
-    const StudyModel model(study, own ? forward_with_kept_walks(keys_of(study)) : options.forward, own ? solver_resolution : 0.0,
+    const StudyModel model(study, own ? forward_with_kept_walks(study) : options.forward, own ? solver_resolution : 0.0,
                            options.stop_requested);
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
