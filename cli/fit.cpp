@@ -18,6 +18,7 @@ namespace {
 struct Arguments {
     std::filesystem::path study;
     std::filesystem::path output;
+    bool resume = false;
 };
 
 ExitStatus exit_status(FitStatus status) {
@@ -33,16 +34,20 @@ ExitStatus exit_status(FitStatus status) {
     throw std::logic_error("a fit status without an exit status");
 }
 
-Fit run(const Study& study, const CommonOptions& common) {
+Fit run(const Study& study, const Arguments& arguments, const CommonOptions& common) {
     ProgressLine line(common, "runs");
     FitOptions options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();
+    options.keeping = {arguments.output.string() + ".runs", arguments.resume};
     options.progress = [&](const FitProgress& progress) {
+        if (!progress.failure.empty())
+            report(common, progress.failure);
         const double fraction = std::min(1.0, static_cast<double>(progress.runs) / std::max(1, progress.max_runs));
         line.show(fraction, progress.runs,
-                  fmt::format("{}: {} runs of {} at most, best misfit {:.4g}", progress.stage, progress.runs,
-                              progress.max_runs, progress.best_misfit));
+                  fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs,
+                              progress.runs <= progress.max_runs ? fmt::format(" of {} at most", progress.max_runs) : "",
+                              progress.best_misfit));
     };
     return fit_study(study, options);
 }
@@ -69,7 +74,7 @@ ExitStatus fit_and_save(const Arguments& arguments, const CommonOptions& common)
         load_specimen(experiment.scene);
     stop_on_signals();
     spdlog::info("the study is read");
-    const Fit fit = run(study, common);
+    const Fit fit = run(study, arguments, common);
     write(fit, arguments.output);
     report(common, fmt::format("{}: {}; {} runs in {}, saved as {}", name(fit.status), fit.message, fit.runs.size(),
                                duration_text(fit.seconds), arguments.output.string()));
@@ -84,6 +89,7 @@ Verb fit_verb(CLI::App& command, const CommonOptions& common) {
     CLI::App* verb = command.add_subcommand("fit", "Adjust parameters until the simulations match the experiments");
     verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();
     verb->add_option("-o,--output", arguments->output, "Where the fit goes")->type_name("FIT.h5")->required();
+    verb->add_flag("--resume", arguments->resume, "Go on from the runs that an earlier call has kept beside its output");
     return {verb, [arguments, &common] { return fit_and_save(*arguments, common); }};
 }
 

@@ -64,15 +64,52 @@ struct UncertaintyChoice {
     int posterior = 0;  // samples
 };
 
-/// What is fitted to what.
+/// A number that a run gives, as a sensitivity study asks for it.
+struct StudyOutput {
+    enum class Kind {
+        peak_force,           // largest |force| [N]
+        initial_stiffness,    // slope of force over displacement before the crack moves [N/m]
+        work_of_fracture,     // area under force over displacement [J]
+        force_at,             // at a displacement [N]
+        crack_length_at,      // at a displacement [m]
+        arrest_length,        // at which the growing crack comes to stand for the n-th time [m]
+        arrest_displacement,  // at which it moves on from there [m]
+    };
+
+    std::string name;  // as the study wrote it
+    Kind kind = Kind::peak_force;
+    double at = 0;   // displacement [m]
+    int number = 0;  // of the arrest, from 1
+};
+
+const char* unit_of(StudyOutput::Kind kind);  // SI
+
+enum class SensitivityMethod { local, morris, sobol };
+
+const char* name(SensitivityMethod method);
+
+struct SensitivityChoice {
+    SensitivityMethod method = SensitivityMethod::local;
+    int samples = 0;  // sobol: rows of each of the two sample matrices; morris: trajectories; 0: as many as the method needs
+};
+
+/// What is fitted to what, or, for a sensitivity study, which outputs are asked for.
 struct Study {
     std::string title;
     std::vector<Experiment> experiments;
+    std::optional<Scene> scene;        // of a study without data; `experiments` is empty then
+    std::vector<StudyOutput> outputs;
     std::vector<Parameter> parameters;
     OptimizerChoice optimizer;
     UncertaintyChoice uncertainty;
+    SensitivityChoice sensitivity;
+    std::optional<double> time_limit;  // of one run of one scene [s]; absent: none
+    std::vector<std::pair<std::string, std::string>> scene_settings;  // --set for the scenes, as they were given
     std::filesystem::path file;
     std::string text;
 };
+
+/// The scenes that a study runs: the one that it stands on, or those of its experiments.
+std::vector<const Scene*> scenes_of(const Study& study);
 
 } // namespace crampfit

@@ -47,6 +47,30 @@ struct FitResidual {
     double residual = 0;    // (modelled - measured) / sigma
 };
 
+/// Whether what is left of one measured curve looks like noise.
+struct FitCheck {
+    std::string experiment;
+    std::string kind;              // "force" or "arrival"
+    int points = 0;
+    double chi_square = 0;         // sum of squared residuals
+    double p_chi_square = 1;       // how often noise alone makes it as large
+    double autocorrelation = 0;    // of neighbouring residuals
+    double p_autocorrelation = 1;  // how often white noise makes it as large
+};
+
+/// One point of a parameter's profile: the least misfit with that parameter held.
+struct ProfilePoint {
+    std::string parameter;
+    double value = 0;   // of the parameter, in its unit
+    double misfit = 0;
+};
+
+/// One sample of the posterior.
+struct PosteriorSample {
+    std::vector<double> parameters;  // in the parameters' units
+    double misfit = 0;
+};
+
 /// What a fit gives.
 struct Fit {
     FitStatus status = FitStatus::converged;
@@ -58,6 +82,9 @@ struct Fit {
     double misfit = 0;                   // sum of squared weighted residuals
     double reduced_chi_square = 0;
     std::vector<FitResidual> residuals;
+    std::vector<FitCheck> checks;        // of each curve
+    std::vector<ProfilePoint> profile;   // of each parameter, if asked for
+    std::vector<PosteriorSample> posterior;
     std::vector<FitRun> runs;
     double seconds = 0;                  // wall time [s]
     unsigned seed = 0;

@@ -138,6 +138,19 @@ constexpr ResidualColumn residual_numbers[] = {
     {"residual", &FitResidual::residual, "1", "(modelled - measured) / sigma"},
 };
 
+struct CheckColumn {
+    const char* name;
+    double FitCheck::*value;
+    const char* description;
+};
+
+constexpr CheckColumn check_numbers[] = {
+    {"chi_square", &FitCheck::chi_square, "sum of squared residuals"},
+    {"p_chi_square", &FitCheck::p_chi_square, "how often noise alone makes it as large"},
+    {"autocorrelation", &FitCheck::autocorrelation, "of neighbouring residuals"},
+    {"p_autocorrelation", &FitCheck::p_autocorrelation, "how often white noise makes it as large"},
+};
+
 void write_residuals(Group& root, const std::vector<FitResidual>& residuals) {
     Group group = root.make_group("residuals", "data against model; the table `residuals`");
     group.write_texts("experiment", column_of(residuals, &FitResidual::experiment), "name of the experiment");
@@ -153,6 +166,67 @@ std::vector<FitResidual> read_residuals(const Group& group) {
     for (const ResidualColumn& column : residual_numbers)
         fill_column(residuals, column.value, group.read_column<double>(column.name, residuals.size()));
     return residuals;
+}
+
+// ---- checks, profile and posterior
+
+void write_checks(Group& root, const std::vector<FitCheck>& checks) {
+    Group group = root.make_group("checks", "whether what is left of each curve looks like noise; the table `checks`");
+    group.write_texts("experiment", column_of(checks, &FitCheck::experiment), "name of the experiment");
+    group.write_texts("kind", column_of(checks, &FitCheck::kind), "force or arrival");
+    std::vector<std::int64_t> points;
+    for (const FitCheck& check : checks)
+        points.push_back(check.points);
+    group.write("points", points, {"1", "points compared"});
+    for (const CheckColumn& column : check_numbers)
+        group.write(column.name, column_of(checks, column.value), {"1", column.description});
+}
+
+std::vector<FitCheck> read_checks(const Group& group) {
+    std::vector<FitCheck> checks(group.read_texts("experiment").size());
+    fill_column(checks, &FitCheck::experiment, group.read_texts("experiment", checks.size()));
+    fill_column(checks, &FitCheck::kind, group.read_texts("kind", checks.size()));
+    const auto points = group.read_column<std::int64_t>("points", checks.size());
+    for (std::size_t i = 0; i < checks.size(); ++i)
+        checks[i].points = static_cast<int>(points[i]);
+    for (const CheckColumn& column : check_numbers)
+        fill_column(checks, column.value, group.read_column<double>(column.name, checks.size()));
+    return checks;
+}
+
+void write_profile(Group& root, const std::vector<ProfilePoint>& profile) {
+    Group group = root.make_group("profile", "least misfit with one parameter held; the table `profile`");
+    group.write_texts("parameter", column_of(profile, &ProfilePoint::parameter), "the one that is held");
+    group.write("value", column_of(profile, &ProfilePoint::value), {parameter_units, "where it is held"});
+    group.write("misfit", column_of(profile, &ProfilePoint::misfit), {"1", "least sum of squared weighted residuals"});
+}
+
+std::vector<ProfilePoint> read_profile(const Group& group) {
+    std::vector<ProfilePoint> profile(group.read_texts("parameter").size());
+    fill_column(profile, &ProfilePoint::parameter, group.read_texts("parameter", profile.size()));
+    fill_column(profile, &ProfilePoint::value, group.read_column<double>("value", profile.size()));
+    fill_column(profile, &ProfilePoint::misfit, group.read_column<double>("misfit", profile.size()));
+    return profile;
+}
+
+void write_posterior(Group& root, const std::vector<PosteriorSample>& samples, std::size_t parameters) {
+    Group group = root.make_group("posterior", "samples of the posterior; the table `posterior`");
+    std::vector<double> values;
+    for (const PosteriorSample& sample : samples)
+        values.insert(values.end(), sample.parameters.begin(), sample.parameters.end());
+    group.write("parameters", values, {samples.size(), parameters}, {parameter_units, "a row a sample, a column a parameter"});
+    group.write("misfit", column_of(samples, &PosteriorSample::misfit), {"1", "sum of squared weighted residuals"});
+}
+
+std::vector<PosteriorSample> read_posterior(const Group& group, std::size_t parameters) {
+    const auto [shape, values] = group.read<double>("parameters", {std::nullopt, parameters});
+    std::vector<PosteriorSample> samples(shape.front());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const double* first = values.data() + i * parameters;
+        samples[i].parameters.assign(first, first + parameters);
+    }
+    fill_column(samples, &PosteriorSample::misfit, group.read_column<double>("misfit", samples.size()));
+    return samples;
 }
 
 FitStatus read_status(const Group& root) {
@@ -189,6 +263,9 @@ void write(const Fit& fit, const std::filesystem::path& file) {
         write_matrix(root, "correlation", fit.correlation, {"1", "correlation of the parameters, in their order"});
         write_runs(root, fit.runs, fit.parameters.size());
         write_residuals(root, fit.residuals);
+        write_checks(root, fit.checks);
+        write_profile(root, fit.profile);
+        write_posterior(root, fit.posterior, fit.parameters.size());
     });
 }
 
@@ -208,6 +285,9 @@ Fit read_fit(const std::filesystem::path& file) {
     fit.correlation = read_matrix(root, "correlation", fit.parameters.size());
     fit.runs = read_runs(root.group("runs"), fit.parameters.size());
     fit.residuals = read_residuals(root.group("residuals"));
+    fit.checks = read_checks(root.group("checks"));
+    fit.profile = read_profile(root.group("profile"));
+    fit.posterior = read_posterior(root.group("posterior"), fit.parameters.size());
     return fit;
 }
 

@@ -149,7 +149,7 @@ class Group {
 /// Opens a file for reading and gives its root. Throws InputError when it is not a file of this program.
 Group open(const std::filesystem::path& file);
 
-/// As above, and the file must be of this kind: "specimen", "record", "fit".
+/// As above, and the file must be of this kind: "specimen", "record", "fit", "sensitivity".
 Group open(const std::filesystem::path& file, const std::string& kind);
 
 /// Makes a file of this kind: `fill` gets the root. The file appears under its name when it is whole, or not at all.

@@ -4,6 +4,7 @@
 #include "datasets/fit.hpp"
 #include "datasets/record.hpp"
 #include "datasets/scene.hpp"
+#include "datasets/sensitivity.hpp"
 
 #include <filesystem>
 #include <iosfwd>
@@ -36,11 +37,13 @@ void write_curves(const Curves& curves, const std::filesystem::path& file);
 void write(const Specimen& specimen, const std::filesystem::path& file);
 void write(const Record& record, const std::filesystem::path& file);
 void write(const Fit& fit, const std::filesystem::path& file);
+void write(const Sensitivity& sensitivity, const std::filesystem::path& file);
 Specimen read_specimen(const std::filesystem::path& file);
 Record read_record(const std::filesystem::path& file);
 Fit read_fit(const std::filesystem::path& file);
+Sensitivity read_sensitivity(const std::filesystem::path& file);
 
-/// Prints a table of any of these files as CSV (INTERFACE.md: series, path, crack1, parameters, runs, residuals, ...).
+/// Prints a table of any of these files as CSV (INTERFACE.md: series, path, crack1, parameters, runs, residuals, indices, ...).
 void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out);
 
 } // namespace crampfit

@@ -7,15 +7,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 namespace crampfit {
 namespace {
 
-const std::vector<std::string> study_keys{"title", "experiments", "parameters", "optimizer", "uncertainty"};
-
-/// Keys of a study for the sensitivity verb.
-const std::array<const char*, 3> sensitivity_keys{"sensitivity", "outputs", "scene"};
+const std::vector<std::string> study_keys{"title",     "experiments", "scene",       "outputs",
+                                          "parameters", "optimizer",   "uncertainty", "sensitivity", "runs"};
 
 /// What --set gives, for the study itself and for all its scenes.
 struct SplitOverrides {
@@ -27,9 +24,7 @@ SplitOverrides split_overrides(const Overrides& overrides) {
     SplitOverrides split;
     for (const auto& [key, value] : overrides) {
         const std::string section = split_key(key, command_line, value).front();
-        const bool of_study =
-            std::find(study_keys.begin(), study_keys.end(), section) != study_keys.end() ||
-            std::find(sensitivity_keys.begin(), sensitivity_keys.end(), section) != sensitivity_keys.end();
+        const bool of_study = std::find(study_keys.begin(), study_keys.end(), section) != study_keys.end();
         (of_study ? split.study : split.scenes).emplace_back(key, value);
     }
     return split;
@@ -120,31 +115,70 @@ UncertaintyChoice read_uncertainty(const Entry& entry) {
     return uncertainty;
 }
 
+SensitivityChoice read_sensitivity(const Entry& entry) {
+    constexpr int most_samples = 1 << 24;
+    entry.only({"method", "samples"});
+    SensitivityChoice sensitivity;
+    if (const auto method = entry.find("method")) {
+        sensitivity.method = method->choice<SensitivityMethod>({{"local", SensitivityMethod::local},
+                                                                {"morris", SensitivityMethod::morris},
+                                                                {"sobol", SensitivityMethod::sobol}});
+    }
+    if (const auto samples = entry.find("samples")) {
+        sensitivity.samples = samples->integer(2, most_samples);
+    }
+    return sensitivity;
+}
+
 }  // namespace
+
+std::vector<const Scene*> scenes_of(const Study& study) {
+    std::vector<const Scene*> scenes;
+    if (study.scene) {
+        scenes.push_back(&*study.scene);
+    }
+    for (const Experiment& experiment : study.experiments) {
+        scenes.push_back(&experiment.scene);
+    }
+    return scenes;
+}
 
 Study read_study(const std::filesystem::path& file, const Overrides& overrides) {
     const SplitOverrides split = split_overrides(overrides);
     const Document document(read_text(file), file, split.study);
     const Entry root = document.root();
-    for (const char* key : sensitivity_keys) {
-        if (const auto entry = root.find(key)) {
-            entry->fail("a sensitivity study is not supported yet");
-        }
-    }
     root.only(study_keys);
     Study study;
     study.file = file;
     study.text = document.text();
+    study.scene_settings = split.scenes;
     if (const auto title = root.find("title")) {
         study.title = title->text();
     }
-    study.experiments = read_experiments(root.at("experiments"), split.scenes);
-    study.parameters = read_parameters(root.at("parameters"), study.experiments);
+    if (const auto scene = root.find("scene")) {
+        if (root.has("experiments")) {
+            scene->fail("a study has either a scene or experiments, each with its own scene");
+        }
+        study.scene = read_scene(scene->existing_file(), split.scenes);
+    } else {
+        study.experiments = read_experiments(root.at("experiments"), split.scenes);
+    }
+    study.parameters = read_parameters(root.at("parameters"), study);
+    if (const auto outputs = root.find("outputs")) {
+        study.outputs = read_outputs(*outputs, study);
+    }
+    if (const auto sensitivity = root.find("sensitivity")) {
+        study.sensitivity = read_sensitivity(*sensitivity);
+    }
     if (const auto optimizer = root.find("optimizer")) {
         study.optimizer = read_optimizer(*optimizer);
     }
     if (const auto uncertainty = root.find("uncertainty")) {
         study.uncertainty = read_uncertainty(*uncertainty);
+    }
+    if (const auto runs = root.find("runs")) {
+        runs->only({"time_limit"});
+        study.time_limit = runs->at("time_limit").number(limits::positive(dimension::time));
     }
     return study;
 }

@@ -11,11 +11,11 @@ namespace crampfit {
 namespace {
 
 /// The rule of the number that `key` leads to in at least one of the scenes.
-NumberRule find_rule(const Entry& entry, const std::string& key, const std::vector<Experiment>& experiments) {
+NumberRule find_rule(const Entry& entry, const std::string& key, const Study& study) {
     std::string reason;
-    for (const Experiment& experiment : experiments) {
+    for (const Scene* scene : scenes_of(study)) {
         try {
-            return find_number(experiment.scene, key, "", "").rule;
+            return find_number(*scene, key, "", "").rule;
         } catch (const InputError& error) {
             reason = error.rule;
         }
@@ -38,11 +38,11 @@ std::vector<Entry> key_entries(const Entry& parameter) {
 }
 
 /// Fills in the keys and returns the rule of each.
-std::vector<NumberRule> read_keys(const Entry& entry, const std::vector<Experiment>& experiments,
+std::vector<NumberRule> read_keys(const Entry& entry, const Study& study,
                                   Parameter& parameter) {
     std::vector<NumberRule> rules;
     for (const Entry& key : key_entries(entry)) {
-        rules.push_back(find_rule(key, key.text(), experiments));
+        rules.push_back(find_rule(key, key.text(), study));
         if (!(rules.back().dimension == rules.front().dimension)) {
             key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}",
                                  describe(rules.back().dimension), describe(rules.front().dimension)));
@@ -71,23 +71,29 @@ std::optional<Prior> read_prior(const Entry& parameter, const Dimension& dimensi
                  entry->at("sd").number(limits::positive(dimension))};
 }
 
-Parameter read_parameter(const Entry& entry, const std::vector<Experiment>& experiments) {
+Parameter read_parameter(const Entry& entry, const Study& study) {
     entry.only({"name", "key", "keys", "initial", "lower", "upper", "scale", "prior"});
     Parameter parameter;
-    const std::vector<NumberRule> rules = read_keys(entry, experiments, parameter);
+    const std::vector<NumberRule> rules = read_keys(entry, study, parameter);
     const auto name = entry.find("name");
     parameter.name = name ? name->text() : parameter.keys.front();
-    parameter.initial = read_value(entry.at("initial"), rules);
+    const auto initial = entry.find("initial");
+    parameter.initial = !initial && study.scene ? *find_number(*study.scene, parameter.keys.front(), "", "").value
+                                                : read_value(entry.at("initial"), rules);
     parameter.lower = read_value(entry.at("lower"), rules);
     parameter.upper = read_value(entry.at("upper"), rules);
-    const Quantity written = entry.at("initial").quantity();
+    const Quantity written = entry.at(initial ? "initial" : "lower").quantity();
     parameter.unit = written.unit;
     parameter.unit_factor = written.factor;
     if (!(parameter.lower < parameter.upper)) {
         entry.at("lower").fail("must be less than upper");
     }
     if (parameter.initial < parameter.lower || parameter.initial > parameter.upper) {
-        entry.at("initial").fail("must lie between lower and upper");
+        if (initial) {
+            initial->fail("must lie between lower and upper");
+        }
+        entry.at("lower").fail(fmt::format("the scene's value, {:g} in SI units, must lie between lower and upper; or give initial",
+                                           parameter.initial));
     }
     if (const auto scale = entry.find("scale")) {
         parameter.scale = scale->choice<Scale>({{"linear", Scale::linear}, {"log", Scale::logarithmic}});
@@ -115,10 +121,10 @@ void check_unlike(const Entry& entry, const Parameter& parameter, const std::vec
 
 }  // namespace
 
-std::vector<Parameter> read_parameters(const Entry& list, const std::vector<Experiment>& experiments) {
+std::vector<Parameter> read_parameters(const Entry& list, const Study& study) {
     std::vector<Parameter> parameters;
     for (const Entry& entry : list.list()) {
-        const Parameter parameter = read_parameter(entry, experiments);
+        const Parameter parameter = read_parameter(entry, study);
         check_unlike(entry, parameter, parameters);
         parameters.push_back(parameter);
     }

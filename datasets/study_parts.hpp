@@ -8,7 +8,11 @@
 
 namespace crampfit {
 
-/// The [[parameters]] of a study; each key must be a number of one of the experiments' scenes. Throws InputError.
-std::vector<Parameter> read_parameters(const Entry& list, const std::vector<Experiment>& experiments);
+/// The [[parameters]] of a study; each key must be a number of one of its scenes. `initial` may be left out where the study stands
+/// on a scene alone, and is the scene's value then. Throws InputError.
+std::vector<Parameter> read_parameters(const Entry& list, const Study& study);
+
+/// The `outputs` of a study. Throws InputError.
+std::vector<StudyOutput> read_outputs(const Entry& list, const Study& study);
 
 }  // namespace crampfit

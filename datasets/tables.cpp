@@ -178,11 +178,75 @@ Table correlation_table(const Fit& fit) {
     return table;
 }
 
+Table checks_table(const Fit& fit) {
+    Table table{{"experiment", "kind", "points", "chi_square", "p_chi_square", "autocorrelation", "p_autocorrelation"}};
+    for (const FitCheck& check : fit.checks)
+        table.push_back({check.experiment, check.kind, std::to_string(check.points), text_of(check.chi_square),
+                         text_of(check.p_chi_square), text_of(check.autocorrelation), text_of(check.p_autocorrelation)});
+    return table;
+}
+
+Table profile_table(const Fit& fit) {
+    Table table{{"parameter", "value", "misfit"}};
+    for (const ProfilePoint& point : fit.profile)
+        table.push_back({point.parameter, text_of(point.value), text_of(point.misfit)});
+    return table;
+}
+
+Table posterior_table(const Fit& fit) {
+    Table table(1);
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    table.front().push_back("misfit");
+    for (const PosteriorSample& sample : fit.posterior) {
+        Row& row = table.emplace_back();
+        for (const double value : sample.parameters)
+            row.push_back(text_of(value));
+        row.push_back(text_of(sample.misfit));
+    }
+    return table;
+}
+
 std::vector<Offer> offers(const Fit& fit) {
     return {{"parameters", [&] { return parameters_table(fit); }},
             {"runs", [&] { return runs_table(fit); }},
             {"residuals", [&] { return residuals_table(fit); }},
-            {"correlation", [&] { return correlation_table(fit); }}};
+            {"correlation", [&] { return correlation_table(fit); }},
+            {"checks", [&] { return checks_table(fit); }},
+            {"profile", [&] { return profile_table(fit); }},
+            {"posterior", [&] { return posterior_table(fit); }}};
+}
+
+// ---- tables of a sensitivity study
+
+Table indices_table(const Sensitivity& sensitivity) {
+    Table table{{"output", "parameter", "method", "value", "lower_95", "upper_95", "kind"}};
+    for (const SensitivityIndex& index : sensitivity.indices)
+        table.push_back({index.output, index.parameter, index.method, text_of(index.value), text_of(index.lower_95),
+                         text_of(index.upper_95), index.kind});
+    return table;
+}
+
+Table runs_table(const Sensitivity& sensitivity) {
+    Table table(1);
+    for (const StudiedParameter& parameter : sensitivity.parameters)
+        table.front().push_back(parameter.name);
+    for (const StudiedOutput& output : sensitivity.outputs)
+        table.front().push_back(output.name);
+    table.front().insert(table.front().end(), {"status", "seconds"});
+    for (const SensitivityRun& run : sensitivity.runs) {
+        Row& row = table.emplace_back();
+        for (const double value : run.parameters)
+            row.push_back(text_of(value));
+        for (const double value : run.outputs)
+            row.push_back(text_of(value));
+        row.insert(row.end(), {run.status, text_of(run.seconds)});
+    }
+    return table;
+}
+
+std::vector<Offer> offers(const Sensitivity& sensitivity) {
+    return {{"indices", [&] { return indices_table(sensitivity); }}, {"runs", [&] { return runs_table(sensitivity); }}};
 }
 
 // ---- tables of a specimen
@@ -317,6 +381,9 @@ void print_table(const std::filesystem::path& file, const std::string& table, st
     } else if (kind == "track") {
         const CrackTrack track = read_crack_track(file);
         print_one_of(offers(track), file, table, out);
+    } else if (kind == "sensitivity") {
+        const Sensitivity sensitivity = read_sensitivity(file);
+        print_one_of(offers(sensitivity), file, table, out);
     } else {
         print_one_of({}, file, table, out);
     }

@@ -1,7 +1,9 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/explore.hpp"
 #include "inverse/kept_walks.hpp"
+#include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/search.hpp"
 #include "inverse/study_model.hpp"
@@ -29,28 +31,12 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// All keys that a study changes.
-std::vector<std::string> keys_of(const Study& study) {
-    std::vector<std::string> keys;
-    for (const Parameter& parameter : study.parameters) {
-        keys.insert(keys.end(), parameter.keys.begin(), parameter.keys.end());
-    }
-    return keys;
-}
-
-std::vector<double> in_units(const UnitBox& box, const Eigen::VectorXd& x) {
-    std::vector<double> values;
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        values.push_back(box.value(j, x[j]) / box.parameters()[static_cast<std::size_t>(j)].unit_factor);
-    }
-    return values;
-}
-
 /// Tells the caller after each run where the fit stands.
 class Reporter {
   public:
-    Reporter(const FitOptions& options, const UnitBox& box, int max_runs) : options_(options), box_(box) {
-        progress_.max_runs = max_runs;
+    Reporter(const FitOptions& options, const Study& study, const UnitBox& box)
+        : options_(options), study_(study), box_(box) {
+        progress_.max_runs = study.optimizer.max_runs;
         progress_.best_misfit = std::numeric_limits<double>::infinity();
     }
 
@@ -67,6 +53,7 @@ class Reporter {
             progress_.best_misfit = run.evaluation->misfit;
             progress_.best = in_units(box_, run.x);
         }
+        progress_.failure = failure_text(study_, box_.values(run.x), *run.evaluation);
         if (options_.progress) {
             options_.progress(progress_);
         }
@@ -74,6 +61,7 @@ class Reporter {
 
   private:
     const FitOptions& options_;
+    const Study& study_;
     const UnitBox& box_;
     Clock::time_point begin_ = Clock::now();
     std::mutex mutex_;
@@ -165,12 +153,15 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
-    const StudyModel model(study, own ? forward_with_kept_walks(keys_of(study)) : options.forward, own ? solver_resolution : 0.0,
+    const StudyModel model(study, own ? forward_with_kept_walks(study) : options.forward, own ? solver_resolution : 0.0,
                            options.stop_requested);
     const UnitBox& box = model.box();
-    Reporter reporter(options, box, study.optimizer.max_runs);
+    Reporter reporter(options, study, box);
+    RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); },
+        box.size(), [&](const Eigen::VectorXd& x, int threads) {
+            return store.at(box.values(x), [&] { return model.evaluate(x, threads); });
+        },
         study.optimizer.max_runs, thread_count(options.threads), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 
@@ -195,17 +186,38 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         for (const Parameter& parameter : study.parameters) {
             names.push_back(parameter.name);
         }
-        const Uncertainty uncertainty = estimate_uncertainty(objective, model.curve_lengths(), names);
-        const Run& best = uncertainty.best;
+        const auto estimate = [&] { return estimate_uncertainty(objective, model.curve_lengths(), names); };
+        const auto look_around = [&](const Uncertainty& about) {
+            if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
+                return Exploration();
+            }
+            const bool cheap = own ? runs_share_walks(study) : options.cheap_runs;
+            const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
+            return explore(objective, about, study.uncertainty, stations, cheap, options.seed,
+                           [&](const std::string& stage) { reporter.set_stage(stage); });
+        };
+        Uncertainty uncertainty = estimate();
+        Exploration exploration = look_around(uncertainty);
+        // It may have come upon a better point. About that one, then, where it is not as good as the same.
+        const double gain = uncertainty.best.evaluation->misfit - objective.best()->evaluation->misfit;
+        if (gain > 0.02 * uncertainty.widening) {
+            objective.set_budget_left(reserve);
+            uncertainty = estimate();
+            exploration = look_around(uncertainty);
+        }
+        const Run best = *objective.best();
         fit.status = objective.stopped() ? FitStatus::interrupted
                      : found.converged   ? FitStatus::converged
                                          : FitStatus::run_limit;
         fit.message = explain(fit.status);
         fill_parameters(fit, box, best.x, uncertainty);
-        fit.message += uncertainty.message + model.remarks();
+        fit.message += uncertainty.message;
+        fill_exploration(fit, box, uncertainty, exploration);
         fit.misfit = best.evaluation->misfit;
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);
+        fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
+        fit.message += lack_of_fit(fit.checks) + model.remarks();
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);

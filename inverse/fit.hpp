@@ -2,8 +2,8 @@
 
 #include "datasets/experiment.hpp"
 #include "datasets/fit.hpp"
-#include "datasets/record.hpp"
-#include "datasets/scene.hpp"
+#include "inverse/forward.hpp"
+#include "inverse/run_store.hpp"
 
 #include <atomic>
 #include <functional>
@@ -20,18 +20,17 @@ struct FitProgress {
     std::vector<double> best;  // parameters of the best run, in their units, in the study's order; empty until then
     std::string stage;         // what is going on, in a word or two: "starts", "descent", "polish", "uncertainty"
     double seconds = 0;        // since the fit began [s]
+    std::string failure;       // why the run that has just ended failed, and the command that runs it again; empty: it did not
 };
-
-/// One simulation of one scene. `stop` is set when the user interrupts; it may be null. Called from several threads at
-/// a time.
-using Forward = std::function<Record(const Scene& scene, const std::atomic<bool>* stop)>;
 
 struct FitOptions {
     int threads = 0;                                    // forward runs side by side; 0: one a core
     Forward forward;                                    // empty: crampfit::simulate
+    bool cheap_runs = false;                            // of `forward`: profile and posterior may make thousands
     std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random
+    RunKeeping keeping;  // of the forward runs, as they end
 
     /// Throws InputError naming the option that is out of range.
     void validate() const;

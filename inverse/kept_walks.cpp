@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -18,10 +19,14 @@ constexpr std::size_t most_walks = 6;
 
 class Walks {
   public:
-    explicit Walks(const std::vector<std::string>& keys) {
-        for (const std::string& key : keys) {
-            if (!key.ends_with(".toughness")) {
-                keys_.push_back(key);
+    explicit Walks(const Study& study) {
+        for (const Parameter& parameter : study.parameters) {
+            for (const std::string& key : parameter.keys) {
+                if (key.ends_with(".toughness")) {
+                    toughness_.emplace_back(key, parameter.initial);
+                } else {
+                    keys_.push_back(key);
+                }
             }
         }
     }
@@ -47,6 +52,16 @@ class Walks {
         return name;
     }
 
+    Scene with_initial_toughness(Scene scene) const {
+        for (const auto& [key, value] : toughness_) {
+            try {
+                set_number(scene, key, value);
+            } catch (const InputError&) {  // another scene's key
+            }
+        }
+        return scene;
+    }
+
     std::shared_ptr<KeptWalk> walk_of(const Scene& scene) {
         const std::string name = name_of(scene);
         const std::lock_guard lock(mutex_);
@@ -55,23 +70,36 @@ class Walks {
                 return walk;
             }
         }
-        walks_.emplace_back(name, std::make_shared<KeptWalk>(scene));
+        walks_.emplace_back(name, std::make_shared<KeptWalk>(with_initial_toughness(scene)));
         if (walks_.size() > most_walks) {
             walks_.pop_front();
         }
         return walks_.back().second;
     }
 
-    std::vector<std::string> keys_;
+    std::vector<std::string> keys_;                           // all but toughnesses
+    std::vector<std::pair<std::string, double>> toughness_;  // key and initial value [J/m^2]
     std::mutex mutex_;
     std::deque<std::pair<std::string, std::shared_ptr<KeptWalk>>> walks_;
 };
 
 }  // namespace
 
-Forward forward_with_kept_walks(const std::vector<std::string>& keys) {
-    auto walks = std::make_shared<Walks>(keys);
+Forward forward_with_kept_walks(const Study& study) {
+    auto walks = std::make_shared<Walks>(study);
     return [walks](const Scene& scene, const std::atomic<bool>* stop) { return walks->run(scene, stop); };
+}
+
+bool runs_share_walks(const Study& study) {
+    for (const Parameter& parameter : study.parameters) {
+        for (const std::string& key : parameter.keys) {
+            if (!key.ends_with(".toughness")) {
+                return false;
+            }
+        }
+    }
+    const auto scenes = scenes_of(study);
+    return std::all_of(scenes.begin(), scenes.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
 }
 
 }  // namespace crampfit

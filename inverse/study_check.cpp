@@ -66,10 +66,17 @@ void check_study(const Study& study) {
     require(optimizer.starts >= 1, study, "optimizer.starts", std::to_string(optimizer.starts), "must be at least 1");
     require(optimizer.max_runs >= 1, study, "optimizer.max_runs", std::to_string(optimizer.max_runs),
             "must be at least 1");
-    require(!study.uncertainty.profile, study, "uncertainty.profile", "true",
-            "not supported yet; leave it out or set it to false");
-    require(study.uncertainty.posterior == 0, study, "uncertainty.posterior",
-            std::to_string(study.uncertainty.posterior), "not supported yet; leave it out or set it to 0");
+    require(study.uncertainty.posterior >= 0, study, "uncertainty.posterior",
+            std::to_string(study.uncertainty.posterior), "must not be negative");
+}
+
+void check_sensitivity_study(const Study& study) {
+    require(!scenes_of(study).empty(), study, "scene", "none", "a sensitivity study needs a scene, or experiments with scenes");
+    require(!study.outputs.empty(), study, "outputs", "none", "a sensitivity study needs outputs to look at");
+    require(!study.parameters.empty(), study, "parameters", "none", "a sensitivity study needs a parameter to vary");
+    for (std::size_t i = 0; i < study.parameters.size(); ++i) {
+        check_parameter(study, study.parameters[i], i);
+    }
 }
 
 }  // namespace crampfit

@@ -1,57 +1,26 @@
 #include "inverse/study_model.hpp"
 
 #include "datasets/error.hpp"
-#include "datasets/io.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/study_check.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 namespace crampfit {
 namespace {
 
-using Settings = std::vector<std::vector<std::pair<Eigen::Index, std::string>>>;
-
-// Which experiments' scenes know each key; a scene without latewood has no use for its toughness. Some scene must.
-Settings find_settings(const Study& study) {
-    Settings settings(study.experiments.size());
-    for (std::size_t j = 0; j < study.parameters.size(); ++j) {
-        for (const std::string& key : study.parameters[j].keys) {
-            std::optional<InputError> unknown;
-            bool found = false;
-            for (std::size_t i = 0; i < study.experiments.size(); ++i) {
-                try {
-                    get_number(study.experiments[i].scene, key);
-                    settings[i].emplace_back(static_cast<Eigen::Index>(j), key);
-                    found = true;
-                } catch (const InputError& error) {
-                    unknown = error;
-                }
-            }
-            if (!found) {
-                throw *unknown;
-            }
-        }
-    }
-    return settings;
-}
-
-bool finite(const Record& record) {
-    return std::all_of(record.series.begin(), record.series.end(), [](const Instant& instant) {
-        return std::isfinite(instant.time) && std::isfinite(instant.displacement) && std::isfinite(instant.force) &&
-               std::isfinite(instant.crack_length);
-    });
+// What cannot be fitted whatever the data hold is refused first.
+const Study& checked(const Study& study) {
+    check_study(study);
+    return study;
 }
 
 }  // namespace
 
 StudyModel::StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop)
-    : study_(study), forward_(std::move(forward)), stop_(stop), box_(study.parameters) {
-    check_study(study);
-    settings_ = find_settings(study);
+    : study_(checked(study)), box_(study.parameters), runs_(study, std::move(forward), stop) {
     std::size_t stations = 0;
     for (const Experiment& experiment : study.experiments) {
         comparisons_.emplace_back(experiment, model_resolution);
@@ -64,40 +33,21 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
     }
 }
 
-StudyModel::Outcome StudyModel::run(std::size_t experiment, const Eigen::VectorXd& values) const {
-    const auto begin = std::chrono::steady_clock::now();
-    Outcome outcome;
-    try {
-        Scene scene = study_.experiments[experiment].scene;
-        for (const auto& [parameter, key] : settings_[experiment]) {
-            set_number(scene, key, values[parameter]);
-        }
-        const Record record = forward_(scene, stop_);
-        const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
-        outcome.status = name(record.status);
-        if (record.series.empty()) {
-            outcome.status += ": the run gave no instants";
-        } else if (!finite(record)) {
-            outcome.status += ": the run gave numbers that are not finite";
-        } else if (!ended) {
-            outcome.status += record.message.empty() ? "" : ": " + record.message;
-        } else {
-            outcome.modelled = comparisons_[experiment].modelled(record);
-            outcome.good = true;
-        }
-    } catch (const std::exception& error) {
-        outcome.status = error.what();
-    }
-    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return outcome;
-}
-
 Evaluation StudyModel::evaluate(const Eigen::VectorXd& x, int threads) const {
     const Eigen::VectorXd values = box_.values(x);
+    struct Outcome {
+        std::string status;
+        double seconds = 0;
+        std::optional<Eigen::VectorXd> modelled;
+    };
     std::vector<Outcome> outcomes(comparisons_.size());
     parallel_for(static_cast<int>(outcomes.size()), threads, [&](int i) {
         const auto k = static_cast<std::size_t>(i);
-        outcomes[k] = run(k, values);
+        const SceneRuns::Outcome run = runs_.run(k, values);
+        outcomes[k] = {run.status, run.seconds, {}};
+        if (run.record) {
+            outcomes[k].modelled = comparisons_[k].modelled(*run.record);
+        }
     });
     Evaluation result;
     std::vector<double> residuals, modelled;
@@ -107,12 +57,15 @@ Evaluation StudyModel::evaluate(const Eigen::VectorXd& x, int threads) const {
         result.seconds += outcome.seconds;
         const std::string who = outcomes.size() > 1 ? study_.experiments[i].name + ": " : "";
         result.status += (result.status.empty() ? "" : "; ") + who + outcome.status;
-        good = good && outcome.good;
-        for (Eigen::Index s = 0; s < outcome.modelled.size(); ++s) {
+        good = good && outcome.modelled;
+        if (!good) {
+            continue;
+        }
+        for (Eigen::Index s = 0; s < outcome.modelled->size(); ++s) {
+            const double value = (*outcome.modelled)[s];
             const FitResidual& station = comparisons_[i].stations()[static_cast<std::size_t>(s)];
-            modelled.push_back(outcome.modelled[s]);
-            residuals.push_back(std::sqrt(study_.experiments[i].weight) * (outcome.modelled[s] - station.measured) /
-                                station.sigma);
+            modelled.push_back(value);
+            residuals.push_back(std::sqrt(study_.experiments[i].weight) * (value - station.measured) / station.sigma);
         }
     }
     if (!good) {

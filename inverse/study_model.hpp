@@ -1,19 +1,18 @@
 #pragma once
 
 #include "datasets/experiment.hpp"
-#include "inverse/fit.hpp"
+#include "datasets/fit.hpp"
 #include "inverse/objective.hpp"
 #include "inverse/residuals.hpp"
+#include "inverse/scene_runs.hpp"
 #include "inverse/unit_box.hpp"
 
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace crampfit {
 
-/// A study made ready to be run at any point of its unit cube: one Comparison an experiment, and which scene takes
-/// which key.
+/// A study made ready to be run at any point of its unit cube: one Comparison an experiment.
 class StudyModel {
   public:
     /// Throws InputError for what cannot be fitted: bounds, noise, options, keys that no scene has, data with nothing
@@ -30,21 +29,10 @@ class StudyModel {
     std::string remarks() const;                                  // on the data, for a person
 
   private:
-    struct Outcome {
-        std::string status;
-        bool good = false;
-        Eigen::VectorXd modelled;
-        double seconds = 0;
-    };
-
-    Outcome run(std::size_t experiment, const Eigen::VectorXd& values) const;
-
     const Study& study_;
-    Forward forward_;
-    const std::atomic<bool>* stop_;
     UnitBox box_;
-    std::vector<Comparison> comparisons_;                                      // one an experiment
-    std::vector<std::vector<std::pair<Eigen::Index, std::string>>> settings_;  // parameter and key, for each experiment
+    std::vector<Comparison> comparisons_;  // one an experiment
+    SceneRuns runs_;
 };
 
 }  // namespace crampfit

@@ -160,6 +160,8 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.covariance = data_covariance(*directions, widening, undetermined);
     const Eigen::MatrixXd own = model_covariance(*directions);
     result.covariance += own;
+    result.widening = widening;
+    result.model_variance = own.diagonal();
     result.message += undetermined.message();
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
     if (share > 0.1) {
@@ -169,6 +171,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
                         100 * share);
     }
     const double t = student_975(std::max(1, independent - p));
+    result.quantile = t;
     for (Eigen::Index j = 0; j < p; ++j) {
         if (!undetermined.contains(j)) {
             const double half = t * std::sqrt(result.covariance(j, j));

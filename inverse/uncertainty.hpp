@@ -17,6 +17,9 @@ struct Uncertainty {
     Eigen::VectorXd upper_95;    // [parameters]
     double reduced_chi_square = 0;
     std::string message;  // what the intervals rest on, and what cannot be told, for a person
+    double widening = 1;  // s: of variances, for what the noise does not explain
+    double quantile = 2;  // of Student's distribution, from standard error to interval
+    Eigen::VectorXd model_variance = {};  // diagonal of V [parameters]; empty where it is not known
 };
 
 /// Intervals about the best run, from how the residuals change with the parameters near it. Runs the differences about

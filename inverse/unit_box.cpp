@@ -35,4 +35,12 @@ Eigen::VectorXd UnitBox::initial() const {
     return x;
 }
 
+std::vector<double> in_units(const UnitBox& box, const Eigen::VectorXd& x) {
+    std::vector<double> values;
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        values.push_back(box.value(j, x[j]) / box.parameters()[static_cast<std::size_t>(j)].unit_factor);
+    }
+    return values;
+}
+
 }  // namespace crampfit

@@ -28,4 +28,7 @@ class UnitBox {
     std::vector<Parameter> parameters_;
 };
 
+/// The point x in the parameters' own units [parameters].
+std::vector<double> in_units(const UnitBox& box, const Eigen::VectorXd& x);
+
 }  // namespace crampfit

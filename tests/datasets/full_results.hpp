@@ -3,6 +3,7 @@
 #include "datasets/fit.hpp"
 #include "datasets/record.hpp"
 #include "datasets/record_file.hpp"
+#include "datasets/sensitivity.hpp"
 #include "datasets/specimen.hpp"
 
 #include <limits>
@@ -102,10 +103,30 @@ inline Fit full_fit() {
     fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5},
                      {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
     fit.runs = {{{80.0, 120.0}, infinite, "unstable", 0.5}, {{103.25, not_a_number}, 12.75, "finished", 0.625}};
+    fit.checks = {{"wedge 1", "force", 50, 12.5, 1.0 / 3.0, -0.0, not_a_number}};
+    fit.profile = {{"EW, toughness", 80.5, infinite}, {"LW \"hard\"", -0.0, 1.0 / 3.0}};
+    fit.posterior = {{{80.0, 1.0 / 3.0}, 12.75}, {{infinite, -0.0}, 13.0}};
     fit.seconds = 3.25;
     fit.seed = 4000000000u;
     fit.study_text = "title = 'ü'";
     return fit;
+}
+
+inline Sensitivity full_sensitivity() {
+    Sensitivity sensitivity;
+    sensitivity.status = SensitivityStatus::interrupted;
+    sensitivity.message = "2 of 3 runs failed";
+    sensitivity.parameters = {{"EW, toughness", "materials.EW.toughness materials.ray.toughness", "J/m^2", 80.0, 1.0 / 3.0, 400.0},
+                              {"nu", "materials.EW.nu", "", 0.3, -0.0, 0.4}};
+    sensitivity.outputs = {{"peak force", "N"}, {"force at 0.5 mm", "N"}, {"arrest length 1", "m"}};
+    sensitivity.indices = {{"peak force", "nu", "sobol", 0.25, -0.5, infinite, "first"},
+                           {"peak force", "EW, toughness", "sobol", not_a_number, 5e-324, 1.0 / 3.0, "total"}};
+    sensitivity.runs = {{{80.0, 0.3}, {1.5, not_a_number, -0.0}, "finished", 0.5},
+                        {{1.0 / 3.0, 0.1}, {not_a_number, not_a_number, not_a_number}, "unstable", 0.25}};
+    sensitivity.seconds = 3.25;
+    sensitivity.seed = 4000000000u;
+    sensitivity.study_text = "title = 'ü'";
+    return sensitivity;
 }
 
 inline Specimen full_specimen() {

@@ -120,10 +120,61 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
         EXPECT_EQ(after.runs[i].status, before.runs[i].status);
         EXPECT_TRUE(same_bits(after.runs[i].seconds, before.runs[i].seconds));
     }
+    ASSERT_EQ(after.checks.size(), before.checks.size());
+    EXPECT_EQ(after.checks[0].experiment, before.checks[0].experiment);
+    EXPECT_EQ(after.checks[0].kind, before.checks[0].kind);
+    EXPECT_EQ(after.checks[0].points, before.checks[0].points);
+    const auto numbers = [](const FitCheck& c) {
+        return std::vector{c.chi_square, c.p_chi_square, c.autocorrelation, c.p_autocorrelation};
+    };
+    EXPECT_TRUE(same_bits(numbers(after.checks[0]), numbers(before.checks[0])));
+    ASSERT_EQ(after.profile.size(), before.profile.size());
+    ASSERT_EQ(after.posterior.size(), before.posterior.size());
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(after.profile[i].parameter, before.profile[i].parameter);
+        EXPECT_TRUE(same_bits(after.profile[i].value, before.profile[i].value));
+        EXPECT_TRUE(same_bits(after.profile[i].misfit, before.profile[i].misfit));
+        EXPECT_TRUE(same_bits(after.posterior[i].parameters, before.posterior[i].parameters));
+        EXPECT_TRUE(same_bits(after.posterior[i].misfit, before.posterior[i].misfit));
+    }
     EXPECT_TRUE(same_bits(std::vector{after.misfit, after.reduced_chi_square, after.seconds},
                           std::vector{before.misfit, before.reduced_chi_square, before.seconds}));
     EXPECT_EQ(after.seed, before.seed);
     EXPECT_EQ(after.study_text, before.study_text);
+}
+
+TEST(UnitHdf5, SensitivityRoundTrip) {
+    const TemporaryFolder folder;
+    const Sensitivity before = full_sensitivity();
+    write(before, folder / "sensitivity.h5");
+    const Sensitivity after = read_sensitivity(folder / "sensitivity.h5");
+    EXPECT_EQ(after.status, before.status);
+    EXPECT_EQ(after.message, before.message);
+    EXPECT_EQ(after.study_text, before.study_text);
+    EXPECT_EQ(after.seed, before.seed);
+    EXPECT_EQ(after.seconds, before.seconds);
+    ASSERT_EQ(after.parameters.size(), before.parameters.size());
+    for (std::size_t i = 0; i < before.parameters.size(); ++i) {
+        const auto tied = [](const StudiedParameter& p) { return std::tie(p.name, p.key, p.unit, p.initial, p.lower, p.upper); };
+        EXPECT_EQ(tied(after.parameters[i]), tied(before.parameters[i]));
+    }
+    ASSERT_EQ(after.outputs.size(), before.outputs.size());
+    EXPECT_EQ(after.outputs[1].name, before.outputs[1].name);
+    EXPECT_EQ(after.outputs[1].unit, before.outputs[1].unit);
+    ASSERT_EQ(after.indices.size(), before.indices.size());
+    for (std::size_t i = 0; i < before.indices.size(); ++i) {
+        const auto texts = [](const SensitivityIndex& x) { return std::tie(x.output, x.parameter, x.method, x.kind); };
+        EXPECT_EQ(texts(after.indices[i]), texts(before.indices[i]));
+        const auto numbers = [](const SensitivityIndex& x) { return std::vector{x.value, x.lower_95, x.upper_95}; };
+        EXPECT_TRUE(same_bits(numbers(after.indices[i]), numbers(before.indices[i])));
+    }
+    ASSERT_EQ(after.runs.size(), before.runs.size());
+    for (std::size_t i = 0; i < before.runs.size(); ++i) {
+        EXPECT_TRUE(same_bits(after.runs[i].parameters, before.runs[i].parameters));
+        EXPECT_TRUE(same_bits(after.runs[i].outputs, before.runs[i].outputs));
+        EXPECT_EQ(after.runs[i].status, before.runs[i].status);
+        EXPECT_EQ(after.runs[i].seconds, before.runs[i].seconds);
+    }
 }
 
 TEST(UnitHdf5, SpecimenComesBackBitForBit) {
@@ -171,6 +222,8 @@ TEST(UnitHdf5, WhatIsEmptyComesBackEmpty) {
     write(unrun, folder / "fit.h5");
     EXPECT_TRUE(read_fit(folder / "fit.h5").runs.empty());
     EXPECT_EQ(read_fit(folder / "fit.h5").covariance.size(), 0);
+    write(Sensitivity{}, folder / "sensitivity.h5");
+    EXPECT_TRUE(read_sensitivity(folder / "sensitivity.h5").runs.empty());
 }
 
 TEST(UnitHdf5, FileSaysWhatItIs) {

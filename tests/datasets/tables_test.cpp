@@ -148,12 +148,25 @@ TEST(UnitTables, RunsResidualsCorrelation) {
                                                        "\"the \"\"hard\"\", late one\",-0.5,1\n");
 }
 
+TEST(UnitTables, SensitivityTables) {
+    const TemporaryFolder folder;
+    Sensitivity sensitivity;
+    sensitivity.parameters = {{"EW toughness", "materials.EW.toughness", "J/m^2", 100, 20, 400}};
+    sensitivity.outputs = {{"peak force", "N"}};
+    sensitivity.indices = {{"peak force", "EW toughness", "sobol", 0.25, -0.5, 1.5, "first"}};
+    sensitivity.runs = {{{80}, {1.5}, "finished", 0.5}};
+    write(sensitivity, folder / "out.h5");
+    EXPECT_EQ(table(folder / "out.h5", "indices"), "output,parameter,method,value,lower_95,upper_95,kind\n"
+                                                   "peak force,EW toughness,sobol,0.25,-0.5,1.5,first\n");
+    EXPECT_EQ(table(folder / "out.h5", "runs"), "EW toughness,peak force,status,seconds\n80,1.5,finished,0.5\n");
+}
+
 TEST(UnitTables, UnknownTableListsThoseThatThereAre) {
     const TemporaryFolder folder;
     write(small_record(), folder / "record.h5");
     EXPECT_EQ(refusal(folder / "record.h5", "serie"), "must be one of: series, path, crack1, path1, driving, reactions");
     write(small_fit(), folder / "fit.h5");
-    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation");
+    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation, checks, profile, posterior");
     Specimen specimen;
     specimen.pixel = 1e-5;
     write(specimen, folder / "specimen.h5");

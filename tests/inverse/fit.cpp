@@ -274,8 +274,7 @@ TEST(UnitFit, RefusesStudiesThatCannotBeFitted) {
     expect_refused([](Study& s) { s.optimizer.method = "newuoa"; }, "optimizer.method");
     expect_refused([](Study& s) { s.optimizer.starts = 0; }, "optimizer.starts");
     expect_refused([](Study& s) { s.optimizer.max_runs = 0; }, "optimizer.max_runs");
-    expect_refused([](Study& s) { s.uncertainty.profile = true; }, "uncertainty.profile");
-    expect_refused([](Study& s) { s.uncertainty.posterior = 100; }, "uncertainty.posterior");
+    expect_refused([](Study& s) { s.uncertainty.posterior = -1; }, "uncertainty.posterior");
     expect_refused(
         [](Study& s) {
             s.experiments[0].data.crack_length.clear();

@@ -1,0 +1,189 @@
+#include "inverse/ensemble.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+namespace crampfit {
+namespace {
+
+constexpr double stretch = 2.0;  // a of Goodman and Weare
+constexpr double impossible = -std::numeric_limits<double>::infinity();
+
+struct Walker {
+    Run run;
+    double log_likelihood = impossible;
+};
+
+/// The walkers and the dice.
+class Sampler {
+  public:
+    Sampler(Objective& objective, const std::function<double(const Evaluation&)>& log_likelihood, unsigned seed)
+        : objective_(objective), log_likelihood_(log_likelihood), generator_(seed) {}
+
+    // Walkers about the centre; false when the runs ended before all were there.
+    bool begin(const Eigen::VectorXd& centre, const Eigen::MatrixXd& covariance, int walkers) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+        const Eigen::MatrixXd root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+        std::vector<Eigen::VectorXd> points;
+        for (int k = 0; k < walkers; ++k) {
+            points.push_back(point_about(centre, root));
+        }
+        const auto evaluations = objective_.at(points);
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            if (!evaluations[k]) {
+                return false;
+            }
+            walkers_.push_back({{points[k], evaluations[k]}, log_likelihood_of(*evaluations[k])});
+        }
+        return true;
+    }
+
+    // Both halves once; false when the runs ended before.
+    bool sweep() {
+        const std::size_t half = walkers_.size() / 2;
+        return move(0, half) && move(half, 0);
+    }
+
+    const std::vector<Walker>& walkers() const { return walkers_; }
+    double acceptance() const { return static_cast<double>(accepted_) / static_cast<double>(std::max(1L, tried_)); }
+
+  private:
+    double uniform() { return (static_cast<double>(generator_()) + 0.5) / 4294967296.0; }  // 2^32
+    double normal() {  // Box and Muller (1958)
+        return std::sqrt(-2 * std::log(uniform())) * std::cos(2 * std::numbers::pi * uniform());
+    }
+
+    double log_likelihood_of(const Evaluation& evaluation) const {
+        return evaluation.usable() ? log_likelihood_(evaluation) : impossible;
+    }
+
+    // Within the cube: drawn anew as long as it is not, and pushed back in where that does not help.
+    Eigen::VectorXd point_about(const Eigen::VectorXd& centre, const Eigen::MatrixXd& root) {
+        constexpr int most_draws = 100;
+        constexpr double inside = 1e-6;
+        Eigen::VectorXd point;
+        for (int i = 0; i < most_draws; ++i) {
+            Eigen::VectorXd z(centre.size());
+            for (double& value : z) {
+                value = normal();
+            }
+            point = centre + root * z;
+            if ((point.array() > 0).all() && (point.array() < 1).all()) {
+                return point;
+            }
+        }
+        return point.cwiseMax(inside).cwiseMin(1 - inside);
+    }
+
+    // Each walker of one half goes toward or away from one of the other half, drawn at random.
+    bool move(std::size_t begin, std::size_t others) {
+        const std::size_t half = walkers_.size() / 2;
+        std::vector<Eigen::VectorXd> points;
+        std::vector<double> z, lots;
+        for (std::size_t k = begin; k < begin + half; ++k) {
+            const auto& other = walkers_[others + static_cast<std::size_t>(uniform() * static_cast<double>(half))].run.x;
+            z.push_back(std::pow((stretch - 1) * uniform() + 1, 2) / stretch);  // density 1 / sqrt(z) over [1/a, a]
+            lots.push_back(std::log(uniform()));
+            points.push_back(other + z.back() * (walkers_[k].run.x - other));
+        }
+        std::vector<Eigen::VectorXd> inside;
+        for (const Eigen::VectorXd& point : points) {
+            if ((point.array() >= 0).all() && (point.array() <= 1).all()) {
+                inside.push_back(point);
+            }
+        }
+        const auto evaluations = objective_.at(inside);
+        std::size_t next = 0;
+        for (std::size_t i = 0; i < half; ++i) {
+            ++tried_;
+            if (next == inside.size() || points[i] != inside[next]) {
+                continue;  // outside the cube
+            }
+            const auto there = evaluations[next++];
+            if (!there) {
+                return false;
+            }
+            Walker& walker = walkers_[begin + i];
+            const double log_likelihood = log_likelihood_of(*there);
+            const auto power = static_cast<double>(points[i].size() - 1);
+            if (lots[i] < power * std::log(z[i]) + log_likelihood - walker.log_likelihood) {
+                walker = {{points[i], there}, log_likelihood};
+                ++accepted_;
+            }
+        }
+        return true;
+    }
+
+    Objective& objective_;
+    const std::function<double(const Evaluation&)>& log_likelihood_;
+    std::mt19937 generator_;
+    std::vector<Walker> walkers_;
+    long tried_ = 0;
+    long accepted_ = 0;
+};
+
+// Integrated autocorrelation time of the ensemble's mean, over the window that is five times as long: Goodman and Weare (2010),
+// section 3, after Sokal.
+double correlation_time(const std::vector<double>& means) {
+    const std::size_t n = means.size();
+    double mean = 0;
+    for (const double value : means) {
+        mean += value / static_cast<double>(n);
+    }
+    const auto covariance = [&](std::size_t lag) {
+        double sum = 0;
+        for (std::size_t i = 0; i + lag < n; ++i) {
+            sum += (means[i] - mean) * (means[i + lag] - mean);
+        }
+        return sum / static_cast<double>(n);
+    };
+    const double variance = covariance(0);
+    double time = 1;
+    for (std::size_t lag = 1; variance > 0 && lag < n && static_cast<double>(lag) < 5 * time; ++lag) {
+        time += 2 * covariance(lag) / variance;
+    }
+    return std::max(1.0, time);
+}
+
+}  // namespace
+
+Ensemble draw_ensemble(Objective& objective, const std::function<double(const Evaluation&)>& log_likelihood,
+                       const Eigen::VectorXd& centre, const Eigen::MatrixXd& covariance, int samples, unsigned seed) {
+    const int p = static_cast<int>(centre.size());
+    const int walkers = std::max(20, 2 * (p + 1));
+    const int sweeps = (samples + walkers - 1) / walkers;
+    const int left_out = std::max(50, sweeps / 3);
+    Sampler sampler(objective, log_likelihood, seed);
+    Ensemble ensemble;
+    std::vector<std::vector<double>> means(static_cast<std::size_t>(p));
+    bool goes_on = sampler.begin(centre, covariance, walkers);
+    for (int i = 0; i < left_out + sweeps && goes_on; ++i) {
+        goes_on = sampler.sweep();
+        if (i < left_out || !goes_on) {
+            continue;
+        }
+        Eigen::VectorXd mean = Eigen::VectorXd::Zero(p);
+        for (const Walker& walker : sampler.walkers()) {
+            mean += walker.run.x / walkers;
+            if (static_cast<int>(ensemble.samples.size()) < samples && walker.run.evaluation->usable()) {
+                ensemble.samples.push_back(walker.run);
+            }
+        }
+        for (int j = 0; j < p; ++j) {
+            means[static_cast<std::size_t>(j)].push_back(mean[j]);
+        }
+    }
+    ensemble.acceptance = sampler.acceptance();
+    ensemble.correlation_time.resize(p);
+    for (int j = 0; j < p; ++j) {
+        ensemble.correlation_time[j] = correlation_time(means[static_cast<std::size_t>(j)]);
+    }
+    return ensemble;
+}
+
+}  // namespace crampfit

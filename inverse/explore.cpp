@@ -1,0 +1,120 @@
+#include "inverse/explore.hpp"
+
+#include "inverse/differences.hpp"
+#include "inverse/local_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr int runs_of_a_profile = 5000;
+constexpr int runs_for_a_sample = 4;  // those left out at the begin and moves that are not made included
+
+// Stands for the model where runs are dear: polynomials of the residuals over the runs about the best one, as wide as the
+// intervals are. Absent where too few runs are near.
+std::optional<Objective> surrogate(const Objective& objective, const Uncertainty& uncertainty) {
+    const Eigen::VectorXd& x = uncertainty.best.x;
+    const double widest = uncertainty.quantile * std::sqrt(uncertainty.covariance.diagonal().maxCoeff());
+    const auto model = LocalModel::fit(objective.runs(), x, std::clamp(widest, difference_reach, 0.5));
+    if (!model) {
+        return std::nullopt;
+    }
+    return Objective(
+        x.size(),
+        [model = *model](const Eigen::VectorXd& at, int) {
+            Evaluation evaluation;
+            evaluation.residuals = model.residuals(at);
+            evaluation.misfit = evaluation.residuals.squaredNorm();
+            return evaluation;
+        },
+        0, 1);
+}
+
+// Standard errors within the box, one each parameter.
+Eigen::VectorXd standard_errors(const Uncertainty& uncertainty) { return uncertainty.covariance.diagonal().cwiseSqrt(); }
+
+double rise_of(const Uncertainty& uncertainty) { return uncertainty.quantile * uncertainty.quantile * uncertainty.widening; }
+
+}  // namespace
+
+Exploration explore(Objective& objective, const Uncertainty& uncertainty, const UncertaintyChoice& choice, int data_residuals,
+                    bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage) {
+    Exploration result;
+    std::optional<Objective> polynomials = cheap ? std::nullopt : surrogate(objective, uncertainty);
+    if (uncertainty.model_variance.size() == 0 || (!cheap && !polynomials)) {
+        result.message = "Too few runs ended well near the best one for a profile or a posterior. ";
+        return result;
+    }
+    Objective& model = cheap ? objective : *polynomials;
+    if (!cheap) {
+        result.message = "Profile and posterior rest on polynomials of the residuals over the runs about the best one, as each run "
+                         "of the model is dear. ";
+    }
+    if (choice.profile) {
+        stage("profile");
+        const Eigen::VectorXd errors = standard_errors(uncertainty);
+        const Run best = cheap ? uncertainty.best : [&] {
+            model.set_budget_left(1);
+            return Run{uncertainty.best.x, model.at(uncertainty.best.x)};
+        }();
+        for (Eigen::Index j = 0; j < model.parameters(); ++j) {
+            model.set_budget_left(runs_of_a_profile);
+            result.profiles.push_back(profile_likelihood(model, best, j, errors[j], rise_of(uncertainty)));
+        }
+    }
+    if (choice.posterior > 0) {
+        stage("posterior");
+        model.set_budget_left(1000 * static_cast<int>(model.parameters()) + runs_for_a_sample * choice.posterior);
+        const auto log_likelihood = [&](const Evaluation& evaluation) {
+            const Eigen::VectorXd& r = evaluation.residuals;
+            const double of_priors = r.tail(r.size() - data_residuals).squaredNorm();
+            return -0.5 * (r.head(data_residuals).squaredNorm() / uncertainty.widening + of_priors);
+        };
+        result.posterior =
+            draw_ensemble(model, log_likelihood, uncertainty.best.x, uncertainty.covariance, choice.posterior, seed);
+        const double time = result.posterior.correlation_time.maxCoeff();
+        result.message += fmt::format(
+            "{} samples of the posterior, worth {:.0f} independent ones ({:.0f} % of the moves made); flat within the bounds on "
+            "each parameter's scale but for priors. ",
+            result.posterior.samples.size(), static_cast<double>(result.posterior.samples.size()) / time,
+            100 * result.posterior.acceptance);
+    }
+    return result;
+}
+
+void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertainty, const Exploration& exploration) {
+    fit.message += exploration.message;
+    for (std::size_t j = 0; j < exploration.profiles.size(); ++j) {
+        const auto k = static_cast<Eigen::Index>(j);
+        const Profile& profile = exploration.profiles[j];
+        FittedParameter& parameter = fit.parameters[j];
+        const double factor = box.parameters()[j].unit_factor;
+        for (std::size_t i = 0; i < profile.x.size(); ++i) {
+            fit.profile.push_back({parameter.name, box.value(k, profile.x[i]) / factor, profile.misfit[i]});
+        }
+        const double least = *std::min_element(profile.misfit.begin(), profile.misfit.end());
+        const auto [lower, upper] = interval(profile, least, rise_of(uncertainty));
+        // The model's own scatter, which no profile of it shows, comes on top.
+        const double x = uncertainty.best.x[k];
+        const double own = uncertainty.quantile * std::sqrt(uncertainty.model_variance[k]);
+        parameter.lower_95 = box.value(k, std::max(0.0, x - std::hypot(x - lower, own))) / factor;
+        parameter.upper_95 = box.value(k, std::min(1.0, x + std::hypot(upper - x, own))) / factor;
+        if (lower == 0.0 || upper == 1.0) {
+            fit.message += fmt::format("The data do not bound '{}' {} within its bounds. ", parameter.name,
+                                       lower > 0.0 ? "above" : upper < 1.0 ? "below" : "above or below");
+        }
+    }
+    if (!exploration.profiles.empty()) {
+        fit.message += "The intervals are those of the profile likelihood. ";
+    }
+    for (const Run& sample : exploration.posterior.samples) {
+        fit.posterior.push_back({in_units(box, sample.x), sample.evaluation->misfit});
+    }
+}
+
+}  // namespace crampfit

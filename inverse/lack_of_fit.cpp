@@ -1,0 +1,62 @@
+#include "inverse/lack_of_fit.hpp"
+
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+namespace {
+
+FitCheck check_curve(const FitResidual* begin, const FitResidual* end, double parameters) {
+    const auto n = static_cast<double>(end - begin);
+    FitCheck check{begin->experiment, begin->kind, static_cast<int>(end - begin)};
+    double neighbours = 0;
+    for (const FitResidual* row = begin; row != end; ++row) {
+        check.chi_square += row->residual * row->residual;
+        neighbours += row + 1 != end ? row->residual * (row + 1)->residual : 0.0;
+    }
+    const double freedom = std::max(1.0, n - parameters);
+    check.p_chi_square = boost::math::cdf(boost::math::complement(boost::math::chi_squared(freedom), check.chi_square));
+    check.autocorrelation = check.chi_square > 0 ? neighbours / check.chi_square : 0.0;
+    const double z = (check.autocorrelation + 1 / n) * std::sqrt(n);
+    check.p_autocorrelation = boost::math::cdf(boost::math::complement(boost::math::normal(), z));
+    return check;
+}
+
+}  // namespace
+
+std::vector<FitCheck> check_fit(const std::vector<FitResidual>& residuals, int parameters) {
+    std::vector<FitCheck> checks;
+    for (std::size_t begin = 0, end = 0; begin < residuals.size(); begin = end) {
+        while (end < residuals.size() && residuals[end].experiment == residuals[begin].experiment &&
+               residuals[end].kind == residuals[begin].kind) {
+            ++end;
+        }
+        const double share = static_cast<double>(end - begin) / static_cast<double>(residuals.size());
+        checks.push_back(check_curve(residuals.data() + begin, residuals.data() + end, parameters * share));
+    }
+    return checks;
+}
+
+std::string lack_of_fit(const std::vector<FitCheck>& checks) {
+    const double rare = 0.01 / (2 * static_cast<double>(std::max<std::size_t>(1, checks.size())));  // Bonferroni
+    std::string text;
+    for (const FitCheck& check : checks) {
+        const std::string curve = fmt::format("{} of '{}'", check.kind, check.experiment);
+        if (check.p_chi_square < rare) {
+            text += fmt::format("Lack of fit: the residuals of {} are {:.2g} times what the noise explains (chi-square test, p = {:.1g}). ",
+                                curve, std::sqrt(check.chi_square / check.points), check.p_chi_square);
+        }
+        if (check.p_autocorrelation < rare) {
+            text += fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}): the model, or "
+                                "its grid, misses something there. ",
+                                curve, check.autocorrelation, check.p_autocorrelation);
+        }
+    }
+    return text;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "inverse/estimate.hpp"
+
+#include <Eigen/Core>
+
+#include <span>
+#include <vector>
+
+namespace crampfit {
+
+/// Which runs the derivatives at a point take by differences, and the derivatives once they have been made: for each
+/// parameter the slope of the polynomial through the point and four more on its axis, on both sides of it, or on one
+/// side next to a bound.
+class LocalDesign {
+  public:
+    /// `x` lies in the unit cube [parameters].
+    explicit LocalDesign(const Eigen::VectorXd& x);
+
+    /// Points of the unit cube: x itself, then four a parameter.
+    const std::vector<Eigen::VectorXd>& points() const { return points_; }
+
+    /// Of the function's values at the points [points], the derivatives by x [parameters]. The interval is what two
+    /// points less would change: the polynomial's own error and the noise of the function. Points that are not a number
+    /// are left out; not a number where less than three are left.
+    std::vector<Estimate> derivatives(std::span<const double> values) const;
+
+  private:
+    std::vector<Eigen::VectorXd> points_;
+};
+
+}  // namespace crampfit

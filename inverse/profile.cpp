@@ -1,0 +1,112 @@
+#include "inverse/profile.hpp"
+
+#include "inverse/minimize.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr int most_steps = 24;            // on a side
+constexpr double least_step = 0.002;      // of the box: below it, a run's own noise is all there is
+constexpr double largest_step = 0.1;      // of the box
+constexpr int runs_of_a_descent = 60;
+
+// x with its coordinate j left out, or put in.
+Eigen::VectorXd without(const Eigen::VectorXd& x, Eigen::Index j) {
+    Eigen::VectorXd others(x.size() - 1);
+    others << x.head(j), x.tail(x.size() - 1 - j);
+    return others;
+}
+
+Eigen::VectorXd with(const Eigen::VectorXd& others, Eigen::Index j, double held) {
+    Eigen::VectorXd x(others.size() + 1);
+    x << others.head(j), held, others.tail(others.size() - j);
+    return x;
+}
+
+// The lowest point with coordinate j held, from a start; absent when no run was usable.
+std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& start, Eigen::Index j) {
+    objective.at(start);
+    if (start.size() > 1) {
+        Objective others(
+            start.size() - 1,
+            [&](const Eigen::VectorXd& y, int) {
+                const auto there = objective.at(with(y, j, start[j]));
+                return there ? *there : Evaluation{"not run", {}, {}};
+            },
+            runs_of_a_descent, 1);
+        minimize_with_ceres(others, without(start, j));
+        if (others.best()) {
+            return Run{with(others.best()->x, j, start[j]), others.best()->evaluation};
+        }
+        return std::nullopt;
+    }
+    const auto there = objective.at(start);
+    return there && there->usable() ? std::optional(Run{start, there}) : std::nullopt;
+}
+
+}  // namespace
+
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double standard_error, double rise) {
+    const double step = std::clamp(0.5 * standard_error, least_step, largest_step);
+    Profile below, above;
+    for (auto* side : {&below, &above}) {
+        Eigen::VectorXd from = best.x, before = best.x;
+        for (int i = 0; i < most_steps && !objective.exhausted(); ++i) {
+            // On in the direction in which the last step went, which in a linear problem leads along the valley.
+            const double held = std::clamp(from[j] + (side == &below ? -step : step), 0.0, 1.0);
+            if (held == from[j]) {
+                break;
+            }
+            Eigen::VectorXd start = i == 0 ? from : Eigen::VectorXd(2 * from - before).cwiseMax(0.0).cwiseMin(1.0);
+            start[j] = held;
+            const auto lowest = lowest_with(objective, start, j);
+            if (!lowest) {
+                break;
+            }
+            side->x.push_back(held);
+            side->misfit.push_back(lowest->evaluation->misfit);
+            if (lowest->evaluation->misfit > best.evaluation->misfit + 1.5 * rise) {
+                break;
+            }
+            before = from;
+            from = lowest->x;
+        }
+    }
+    Profile profile;
+    profile.x.assign(below.x.rbegin(), below.x.rend());
+    profile.misfit.assign(below.misfit.rbegin(), below.misfit.rend());
+    profile.x.push_back(best.x[j]);
+    profile.misfit.push_back(best.evaluation->misfit);
+    profile.x.insert(profile.x.end(), above.x.begin(), above.x.end());
+    profile.misfit.insert(profile.misfit.end(), above.misfit.begin(), above.misfit.end());
+    return profile;
+}
+
+std::pair<double, double> interval(const Profile& profile, double least, double rise) {
+    const double level = std::sqrt(rise);
+    const auto height = [&](std::size_t i) { return std::sqrt(std::max(0.0, profile.misfit[i] - least)); };
+    const auto lowest = static_cast<std::size_t>(std::min_element(profile.misfit.begin(), profile.misfit.end()) - profile.misfit.begin());
+    const auto crossing = [&](std::size_t in, std::size_t out) {
+        return std::lerp(profile.x[in], profile.x[out], (level - height(in)) / (height(out) - height(in)));
+    };
+    std::pair<double, double> ends{0.0, 1.0};
+    for (std::size_t i = lowest; i > 0; --i) {
+        if (height(i - 1) >= level) {
+            ends.first = crossing(i, i - 1);
+            break;
+        }
+    }
+    for (std::size_t i = lowest; i + 1 < profile.x.size(); ++i) {
+        if (height(i + 1) >= level) {
+            ends.second = crossing(i, i + 1);
+            break;
+        }
+    }
+    return ends;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "inverse/objective.hpp"
+
+#include <Eigen/Core>
+
+#include <utility>
+#include <vector>
+
+namespace crampfit {
+
+/// How far the misfit can be lowered by all other parameters while one is held: points of the unit cube by that parameter's
+/// coordinate, rising, the best run's among them.
+struct Profile {
+    std::vector<double> x;       // of the parameter that is held, 0..1
+    std::vector<double> misfit;  // least sum of squares there
+};
+
+/// The profile of parameter j about the best run, outwards in steps of about half a `standard_error` until the misfit has risen by
+/// `rise` or the bound is reached. Each point takes a descent of the others from where the one before ended; a point at which all
+/// runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence intervals,
+/// Applied Statistics 37.
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double standard_error, double rise);
+
+/// Where the profile comes up to `rise` above `least` below and above its lowest point: between two of its points as the square
+/// root of the rise goes, which is a straight line in a linear problem. A side that does not come up to it: its end's 0 or 1.
+std::pair<double, double> interval(const Profile& profile, double least, double rise);
+
+}  // namespace crampfit

@@ -1,0 +1,160 @@
+#include "inverse/run_store.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace crampfit {
+namespace {
+
+template <class T> std::string_view bytes_of(const std::vector<T>& values) {
+    return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+// All that the result of a run depends on besides the parameters' values; bounds, optimizer and what is made of the runs do not
+// count, so that they may change from one call to the next.
+std::uint64_t fingerprint(const Study& study) {
+    Fingerprint print;
+    print.add(CRAMPFIT_VERSION);
+    for (const Scene* scene : scenes_of(study)) {
+        print.add(scene->text);
+        if (const auto& map = scene->specimen.map) {
+            print.add(bytes_of(map->label)).add(bytes_of(map->grade)).add(bytes_of(map->density)).add(bytes_of(map->orientation));
+            print.add(map->pixel);
+        }
+    }
+    for (const Experiment& experiment : study.experiments) {
+        const Curves& data = experiment.data;
+        print.add(data.time).add(data.displacement).add(data.force).add(data.crack_length);
+        const Noise& noise = experiment.noise;
+        for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time}) {
+            print.add(sigma.value_or(0.0));
+        }
+        print.add(experiment.weight);
+    }
+    for (const StudyOutput& output : study.outputs) {
+        print.add(output.name);
+    }
+    for (const Parameter& parameter : study.parameters) {
+        for (const std::string& key : parameter.keys) {
+            print.add(key);
+        }
+        if (parameter.prior) {
+            print.add(parameter.prior->mean).add(parameter.prior->sd);
+        }
+    }
+    return print.value();
+}
+
+// As results: the number of residuals, the residuals, what was modelled.
+StoredRun stored(const std::vector<double>& values, const Evaluation& evaluation) {
+    StoredRun run{values, {}, evaluation.status, evaluation.seconds};
+    if (evaluation.usable()) {
+        run.results.push_back(static_cast<double>(evaluation.residuals.size()));
+        run.results.insert(run.results.end(), evaluation.residuals.begin(), evaluation.residuals.end());
+        run.results.insert(run.results.end(), evaluation.modelled.begin(), evaluation.modelled.end());
+    }
+    return run;
+}
+
+Evaluation evaluation_of(const StoredRun& run) {
+    Evaluation evaluation;
+    evaluation.status = run.status;
+    evaluation.seconds = run.seconds;
+    if (!run.results.empty()) {
+        const auto residuals = static_cast<Eigen::Index>(run.results[0]);
+        const auto modelled = static_cast<Eigen::Index>(run.results.size()) - 1 - residuals;
+        evaluation.residuals = Eigen::Map<const Eigen::VectorXd>(run.results.data() + 1, residuals);
+        evaluation.modelled = Eigen::Map<const Eigen::VectorXd>(run.results.data() + 1 + residuals, modelled);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+    }
+    return evaluation;
+}
+
+std::string quoted_for_shell(const std::string& word) {
+    std::string quoted = "'";
+    for (const char letter : word) {
+        quoted += letter == '\'' ? "'\\''" : std::string(1, letter);
+    }
+    return quoted + "'";
+}
+
+// A value as a scene reads it, with the same bits: what is divided by the unit's factor and multiplied again may be one off.
+std::string with_unit(double value, const Parameter& parameter) {
+    double number = value / parameter.unit_factor;
+    for (const double near : {number, std::nextafter(number, INFINITY), std::nextafter(number, -INFINITY)}) {
+        if (near * parameter.unit_factor == value) {
+            number = near;
+            break;
+        }
+    }
+    return parameter.unit.empty() ? fmt::format("{}", number) : fmt::format("\"{} {}\"", number, parameter.unit);
+}
+
+bool knows(const Scene& scene, const std::string& key) {
+    try {
+        get_number(scene, key);
+        return true;
+    } catch (const InputError&) {
+        return false;
+    }
+}
+
+}  // namespace
+
+RunStore::RunStore(const RunKeeping& keeping, const Study& study, const std::atomic<bool>* stop) : stop_(stop) {
+    if (keeping.file.empty()) {
+        return;
+    }
+    journal_ = std::make_unique<RunJournal>(keeping.file, fingerprint(study), keeping.resume);
+    for (const StoredRun& run : journal_->found()) {
+        known_.emplace(run.parameters, evaluation_of(run));
+    }
+}
+
+Evaluation RunStore::at(const Eigen::VectorXd& values, const std::function<Evaluation()>& run) {
+    const std::vector<double> key(values.begin(), values.end());
+    {
+        const std::lock_guard lock(mutex_);
+        if (const auto known = known_.find(key); known != known_.end()) {
+            return known->second;
+        }
+    }
+    const Evaluation evaluation = run();
+    if (!evaluation.usable() && stop_ && *stop_) {
+        return evaluation;
+    }
+    if (journal_) {
+        journal_->add(stored(key, evaluation));
+    }
+    const std::lock_guard lock(mutex_);
+    return known_.emplace(key, evaluation).first->second;
+}
+
+std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {
+    if (evaluation.usable()) {
+        return "";
+    }
+    std::string text = fmt::format("a run failed: {}; to run it again:", evaluation.status);
+    for (const Scene* scene : scenes_of(study)) {
+        text += "\n  crampfit simulate " + quoted_for_shell(scene->file.string());
+        for (const auto& [key, value] : study.scene_settings) {
+            text += " --set " + quoted_for_shell(key + "=" + value);
+        }
+        for (std::size_t j = 0; j < study.parameters.size(); ++j) {
+            for (const std::string& key : study.parameters[j].keys) {
+                if (knows(*scene, key)) {
+                    text += " --set " +
+                            quoted_for_shell(key + "=" + with_unit(values[static_cast<Eigen::Index>(j)], study.parameters[j]));
+                }
+            }
+        }
+        text += " -o again.h5";
+    }
+    return text;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,47 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "datasets/run_journal.hpp"
+#include "inverse/objective.hpp"
+
+#include <Eigen/Core>
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// Where forward runs are kept as they end, so that a study can go on after any end of the process.
+struct RunKeeping {
+    std::filesystem::path file;  // empty: they are not kept
+    bool resume = false;         // take the runs that are there already, instead of beginning anew
+};
+
+/// All forward evaluations of a study, by the parameters' values: none is made twice, in this process or after it.
+class RunStore {
+  public:
+    /// `stop` may be null. Throws InputError when the runs cannot be kept, or belong to another study.
+    RunStore(const RunKeeping& keeping, const Study& study, const std::atomic<bool>* stop);
+
+    /// What the study gave with these values [parameters], SI, before; or else what `run` gives now. Called from several
+    /// threads at a time. A run that the user has stopped is not kept.
+    Evaluation at(const Eigen::VectorXd& values, const std::function<Evaluation()>& run);
+
+  private:
+    std::unique_ptr<RunJournal> journal_;
+    const std::atomic<bool>* stop_;
+    std::mutex mutex_;
+    std::map<std::vector<double>, Evaluation> known_;
+};
+
+/// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one
+/// that did not fail.
+std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation);
+
+}  // namespace crampfit

@@ -1,0 +1,39 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+#include "datasets/sensitivity.hpp"
+#include "inverse/forward.hpp"
+#include "inverse/run_store.hpp"
+
+#include <atomic>
+#include <functional>
+
+namespace crampfit {
+
+struct SensitivityProgress {
+    int runs = 0;    // forward runs that have ended
+    int planned = 0;
+    int failed = 0;
+    std::string failure;  // why the run that has just ended failed, and the command that runs it again; empty: it did not
+};
+
+struct SensitivityOptions {
+    int threads = 0;                                            // forward runs side by side; 0: one a core
+    Forward forward;                                            // empty: crampfit::simulate
+    std::function<void(const SensitivityProgress&)> progress;   // after every forward run, one call at a time; may be empty
+    const std::atomic<bool>* stop_requested = nullptr;          // set from outside: the study ends with what it has
+    unsigned seed = 1;                                          // of everything that is drawn at random
+    RunKeeping keeping;  // of the forward runs, as they end
+
+    /// Throws InputError naming the option that is out of range.
+    void validate() const;
+};
+
+/// How the study's outputs answer to its parameters, by the study's method; parameters go evenly over their box, on a log scale
+/// where they have one. A study of experiments gives the outputs of each experiment's scene.
+/// A picture or specimen file must have been read into each `scene.specimen.map` before.
+/// The result depends on the study and the seed, not on the number of threads. A forward run that fails is recorded and left out.
+/// Throws InputError for a study that cannot be made as it asks, before anything runs.
+Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& options = {});
+
+}  // namespace crampfit

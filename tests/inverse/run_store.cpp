@@ -1,0 +1,240 @@
+#include "inverse/run_store.hpp"
+#include "datasets/error.hpp"
+#include "inverse/fit.hpp"
+#include "inverse/sensitivity.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+#include "tests/temporary_folder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace crampfit::testing {
+namespace {
+
+std::uint64_t bits(double x) { return std::bit_cast<std::uint64_t>(x); }
+
+void expect_same_bits(const Fit& a, const Fit& b) {
+    ASSERT_EQ(a.runs.size(), b.runs.size());
+    for (std::size_t i = 0; i < a.runs.size(); ++i) {
+        EXPECT_EQ(a.runs[i].parameters, b.runs[i].parameters);
+        EXPECT_EQ(bits(a.runs[i].misfit), bits(b.runs[i].misfit));
+        EXPECT_EQ(a.runs[i].status, b.runs[i].status);
+    }
+    EXPECT_EQ(a.covariance, b.covariance);
+    EXPECT_EQ(a.message, b.message);
+    ASSERT_EQ(a.residuals.size(), b.residuals.size());
+    for (std::size_t i = 0; i < a.residuals.size(); ++i) {
+        EXPECT_EQ(bits(a.residuals[i].modelled), bits(b.residuals[i].modelled));
+    }
+}
+
+// Each run takes a while, fails now and then, and before it begins leaves its parameters' bits in a file.
+Forward slow_and_told(const std::filesystem::path& diary, int milliseconds) {
+    return [diary, milliseconds](const Scene& scene, const std::atomic<bool>*) {
+        const double toughness[] = {scene.materials.at("EW").toughness, scene.materials.at("LW").toughness};
+        std::FILE* file = std::fopen(diary.c_str(), "a");
+        std::fwrite(toughness, sizeof toughness, 1, file);
+        std::fclose(file);
+        std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+        if (scramble(toughness[0], toughness[1]) < 0.2) {
+            throw std::runtime_error("lost");
+        }
+        return FakeWedge{}(scene);
+    };
+}
+
+using Values = std::array<double, 2>;
+
+// How many times each run has begun.
+std::map<Values, int> begun(const std::filesystem::path& diary) {
+    std::map<Values, int> times;
+    std::ifstream in(diary, std::ios::binary);
+    for (Values values; in.read(reinterpret_cast<char*>(values.data()), sizeof values);) {
+        ++times[values];
+    }
+    return times;
+}
+
+// The runs that a journal holds: entries of length, checksum, and then the number of parameters, the parameters and more.
+std::vector<Values> kept(const std::filesystem::path& journal) {
+    std::vector<Values> runs;
+    std::ifstream in(journal, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    const auto number = [&](std::size_t at) {
+        std::uint64_t value = 0;
+        std::memcpy(&value, bytes.data() + at, sizeof value);
+        return value;
+    };
+    for (std::size_t at = 0; at + 16 <= bytes.size() && at + 16 + number(at) <= bytes.size(); at += 16 + number(at)) {
+        if (at > 0) {  // the first says whose runs these are
+            std::memcpy(runs.emplace_back().data(), bytes.data() + at + 24, sizeof(Values));
+        }
+    }
+    return runs;
+}
+
+// Killed 20 times at moments drawn at random, resumed each time, in the end left to finish.
+TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
+    const TemporaryFolder folder;
+    Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    study.optimizer = {.method = "sbplx", .starts = 2, .max_runs = 120};
+    FitOptions options;
+    options.threads = 2;
+    options.forward = slow_and_told(folder / "whole.txt", 0);
+    const Fit whole = fit_study(study, options);
+
+    options.forward = slow_and_told(folder / "diary.txt", 4);
+    options.keeping = {folder / "fit.runs", true};
+    std::mt19937 generator(11);
+    int killed = 0;
+    std::map<Values, int> begun_when_kept;
+    for (int i = 0; i < 20; ++i) {
+        const pid_t child = ::fork();
+        if (child == 0) {
+            fit_study(study, options);
+            ::_exit(0);
+        }
+        std::this_thread::sleep_for(std::chrono::microseconds(5000 + generator() % 15000));
+        ::kill(child, SIGKILL);
+        int status = 0;
+        ::waitpid(child, &status, 0);
+        killed += WIFSIGNALED(status) ? 1 : 0;
+        const auto times = begun(folder / "diary.txt");
+        for (const Values& run : kept(folder / "fit.runs")) {
+            begun_when_kept.emplace(run, times.at(run));
+        }
+    }
+    options.threads = 3;
+    const Fit resumed = fit_study(study, options);
+    expect_same_bits(resumed, whole);
+    const auto times = begun(folder / "diary.txt");
+    std::printf("%d kills, %zu runs, %zu kept before the last start\n", killed, times.size(), begun_when_kept.size());
+    EXPECT_EQ(times.size(), whole.runs.size());
+    EXPECT_EQ(killed, 20);
+    EXPECT_GT(begun_when_kept.size(), 20u);
+    for (const auto& [run, count] : begun_when_kept) {
+        EXPECT_EQ(times.at(run), count) << "run again though it was kept";
+    }
+
+    options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::logic_error("run again"); };
+    expect_same_bits(fit_study(study, options), whole);
+}
+
+TEST(SystemResume, ATornLastEntryCostsOneRun) {
+    const TemporaryFolder folder;
+    const Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    FitOptions options = with(FakeWedge{});
+    options.keeping = {folder / "fit.runs", false};
+    const Fit whole = fit_study(study, options);
+    const std::string bytes = folder.read("fit.runs");
+    options.keeping.resume = true;
+    for (const std::size_t lost : {std::size_t{1}, std::size_t{17}, bytes.size() - 1, bytes.size() - 30, bytes.size()}) {
+        folder.write("fit.runs", bytes.substr(0, bytes.size() - lost));
+        int runs = 0;
+        options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
+            ++runs;
+            return FakeWedge{}(scene);
+        };
+        expect_same_bits(fit_study(study, options), whole);
+        EXPECT_EQ(folder.read("fit.runs").size(), bytes.size());
+        EXPECT_EQ(runs, lost < 100 ? 1 : static_cast<int>(whole.runs.size()));
+    }
+    std::string spoilt = bytes;
+    spoilt[bytes.size() / 2] ^= 1;
+    folder.write("fit.runs", spoilt);
+    expect_same_bits(fit_study(study, options), whole);
+}
+
+TEST(UnitResume, RunsOfAnotherStudyAndOtherFilesAreRefused) {
+    const TemporaryFolder folder;
+    Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    FitOptions options = with(FakeWedge{});
+    options.keeping = {folder / "fit.runs", false};
+    fit_study(study, options);
+    options.keeping.resume = true;
+    study.optimizer.max_runs = 70;  // may change
+    study.parameters[0].upper = 390;
+    EXPECT_NO_THROW(fit_study(study, options));
+    study.experiments[0].data.force[7] += 1e-9;  // may not
+    EXPECT_THROW(fit_study(study, options), InputError);
+    options.keeping.resume = false;
+    EXPECT_NO_THROW(fit_study(study, options));
+    folder.write("fit.runs", std::string(1000, 'x'));
+    EXPECT_THROW(fit_study(study, options), InputError);
+    EXPECT_EQ(folder.read("fit.runs").size(), 1000u);
+}
+
+TEST(SystemResume, ASensitivityStudyGoesOn) {
+    const TemporaryFolder folder;
+    Study study = wedge_study(FakeWedge{});
+    study.scene = study.experiments[0].scene;
+    study.experiments.clear();
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0}, {"arrest", StudyOutput::Kind::arrest_length, 0, 3}};
+    study.sensitivity = {SensitivityMethod::sobol, 8};
+    SensitivityOptions options;
+    options.threads = 2;
+    options.forward = slow_and_told(folder / "diary.txt", 0);
+    const Sensitivity whole = study_sensitivity(study, options);
+    options.keeping = {folder / "out.runs", false};
+    std::atomic<bool> stop{false};
+    options.stop_requested = &stop;
+    std::atomic<int> runs{0};
+    options.forward = [&, inner = options.forward](const Scene& scene, const std::atomic<bool>* flag) {
+        stop = ++runs >= 15;
+        return inner(scene, flag);
+    };
+    EXPECT_EQ(study_sensitivity(study, options).status, SensitivityStatus::interrupted);
+    options.keeping.resume = true;
+    options.stop_requested = nullptr;
+    const Sensitivity resumed = study_sensitivity(study, options);
+    EXPECT_GE(runs, 32);
+    EXPECT_LE(runs, 34);  // those that failed at the very end of the first part are not known to have failed by themselves
+    ASSERT_EQ(resumed.indices.size(), whole.indices.size());
+    for (std::size_t i = 0; i < whole.indices.size(); ++i) {
+        EXPECT_EQ(bits(resumed.indices[i].value), bits(whole.indices[i].value));
+        EXPECT_EQ(bits(resumed.indices[i].upper_95), bits(whole.indices[i].upper_95));
+    }
+}
+
+TEST(SystemResume, RunsThatHangAreStoppedAndRecorded) {
+    Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    study.time_limit = 0.02;
+    study.experiments[0].scene.file = "wedge's.toml";
+    study.scene_settings = {{"model.cell", "0.1 mm"}};
+    FitOptions options;
+    options.threads = 2;
+    options.forward = [](const Scene& scene, const std::atomic<bool>* stop) {
+        Record record = FakeWedge{}(scene);
+        if (scramble(scene.materials.at("EW").toughness, scene.materials.at("LW").toughness) < 0.1) {
+            while (!*stop) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            }
+            record.status = RunStatus::interrupted;
+        }
+        return record;
+    };
+    std::string failure;
+    options.progress = [&](const FitProgress& progress) { failure = progress.failure.empty() ? failure : progress.failure; };
+    const Fit fit = fit_study(study, options);
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    EXPECT_NEAR(fit.parameters[0].value / true_earlywood, 1, 0.03);
+    EXPECT_NE(failure.find("longer than runs.time_limit = 0.02 s"), std::string::npos) << failure;
+    EXPECT_NE(failure.find("crampfit simulate 'wedge'\\''s.toml' --set 'model.cell=0.1 mm' --set 'materials.EW.toughness=\""),
+              std::string::npos)
+        << failure;
+}
+
+}  // namespace
+}  // namespace crampfit::testing

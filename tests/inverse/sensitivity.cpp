@@ -1,0 +1,324 @@
+#include "inverse/sensitivity.hpp"
+#include "datasets/error.hpp"
+#include "inverse/local_design.hpp"
+#include "inverse/morris.hpp"
+#include "inverse/outputs.hpp"
+#include "inverse/saltelli.hpp"
+#include "inverse/sobol_points.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <set>
+
+namespace crampfit::testing {
+namespace {
+
+template <class Design> std::vector<double> values_at(const Design& design, double (*f)(const Eigen::VectorXd&)) {
+    std::vector<double> values;
+    for (const Eigen::VectorXd& x : design.points()) {
+        values.push_back(f(x));
+    }
+    return values;
+}
+
+bool inside(const Estimate& estimate, double truth) { return estimate.lower_95 <= truth && truth <= estimate.upper_95; }
+
+// Ishigami and Homma (1990) with a = 7, b = 0.1: y = sin u1 + a sin^2 u2 + b u3^4 sin u1, u uniform over (-pi, pi).
+double ishigami(const Eigen::VectorXd& x) {
+    const Eigen::Vector3d u = std::numbers::pi * (2 * x.array() - 1);
+    return std::sin(u[0]) + 7 * std::pow(std::sin(u[1]), 2) + 0.1 * std::pow(u[2], 4) * std::sin(u[0]);
+}
+
+struct Truth {
+    std::vector<double> first, total;
+};
+
+Truth ishigami_indices() {
+    const double a = 7, b = 0.1, pi4 = std::pow(std::numbers::pi, 4);
+    const double v1 = 0.5 * std::pow(1 + b * pi4 / 5, 2), v2 = a * a / 8;
+    const double v13 = b * b * pi4 * pi4 * (1.0 / 18 - 1.0 / 50);
+    const double v = v1 + v2 + v13;
+    return {{v1 / v, v2 / v, 0}, {(v1 + v13) / v, v2 / v, v13 / v}};
+}
+
+// Saltelli and Sobol (1995): y = product of (|4 x_j - 2| + a_j) / (1 + a_j).
+constexpr std::array<double, 8> g_weights{0, 1, 4.5, 9, 99, 99, 99, 99};
+
+double g_function(const Eigen::VectorXd& x) {
+    double y = 1;
+    for (Eigen::Index j = 0; j < x.size(); ++j) {
+        const double a = g_weights[static_cast<std::size_t>(j)];
+        y *= (std::abs(4 * x[j] - 2) + a) / (1 + a);
+    }
+    return y;
+}
+
+Truth g_indices() {
+    const auto part = [](double a) { return 1 / (3 * (1 + a) * (1 + a)); };
+    double all = 1;
+    for (const double a : g_weights) {
+        all *= 1 + part(a);
+    }
+    Truth truth;
+    for (const double a : g_weights) {
+        truth.first.push_back(part(a) / (all - 1));
+        truth.total.push_back(part(a) * all / (1 + part(a)) / (all - 1));
+    }
+    return truth;
+}
+
+void expect_all_inside(double (*f)(const Eigen::VectorXd&), const Truth& truth, const char* what) {
+    const auto p = static_cast<Eigen::Index>(truth.first.size());
+    int missed = 0, of = 0;
+    for (const int rows : {512, 1024, 4096}) {
+        for (unsigned seed = 1; seed <= (rows > 1024 ? 1 : 10); ++seed) {
+            const SaltelliDesign design(p, rows, seed);
+            const auto indices = design.indices(values_at(design, f));
+            for (std::size_t j = 0; j < truth.first.size(); ++j) {
+                const bool both = inside(indices.first[j], truth.first[j]) && inside(indices.total[j], truth.total[j]);
+                if (seed == 1) {
+                    std::printf("%s, %d rows, x%zu: first %.4f (%.4f .. %.4f), exact %.4f; total %.4f (%.4f .. %.4f), exact %.4f\n",
+                                what, rows, j + 1, indices.first[j].value, indices.first[j].lower_95,
+                                indices.first[j].upper_95, truth.first[j], indices.total[j].value, indices.total[j].lower_95,
+                                indices.total[j].upper_95, truth.total[j]);
+                    EXPECT_TRUE(both) << what << ' ' << rows << " rows, x" << j + 1;
+                }
+                missed += both ? 0 : 1;
+                ++of;
+            }
+        }
+    }
+    // Sobol points err less than the drawn points whose scatter the bootstrap estimates.
+    std::printf("%s: %d of %d pairs of indices outside their 95 %% intervals\n", what, missed, of);
+    EXPECT_LE(missed, of / 20);
+}
+
+TEST(VerificationSensitivity, IshigamisIndicesLieInTheirIntervals) {
+    const Truth truth = ishigami_indices();
+    EXPECT_NEAR(truth.first[0], 0.3139, 5e-5);
+    EXPECT_NEAR(truth.first[1], 0.4424, 5e-5);
+    EXPECT_NEAR(truth.total[0], 0.5576, 5e-5);
+    expect_all_inside(ishigami, truth, "Ishigami");
+}
+
+TEST(VerificationSensitivity, SobolsGIndicesLieInTheirIntervals) { expect_all_inside(g_function, g_indices(), "Sobol G"); }
+
+// Error of the indices of Sobol points against rows: order 1 for a smooth function, where drawn points have 1/2.
+TEST(VerificationSensitivity, IndicesConvergeFasterThanDrawnPointsWould) {
+    const Truth truth = ishigami_indices();
+    const auto error = [&](int rows) {
+        double sum = 0;
+        for (unsigned seed = 1; seed <= 8; ++seed) {
+            const SaltelliDesign design(3, rows, seed);
+            const auto indices = design.indices(values_at(design, ishigami));
+            for (std::size_t j = 0; j < 3; ++j) {
+                sum += std::pow(indices.first[j].value - truth.first[j], 2) + std::pow(indices.total[j].value - truth.total[j], 2);
+            }
+        }
+        return std::sqrt(sum / 48);
+    };
+    const double coarse = error(256), fine = error(4096);
+    std::printf("Ishigami: error %.4f at 256 rows, %.5f at 4096\n", coarse, fine);
+    EXPECT_LT(fine, coarse / 8);  // 4 for drawn points, 16 at order 1
+}
+
+TEST(UnitSensitivity, FailedRowsAreLeftOut) {
+    const SaltelliDesign design(3, 2048, 1);
+    std::vector<double> values = values_at(design, ishigami);
+    std::mt19937 generator(3);
+    for (double& value : values) {
+        value = generator() % 5 == 0 ? std::numeric_limits<double>::quiet_NaN() : value;
+    }
+    const auto indices = design.indices(values);
+    const Truth truth = ishigami_indices();
+    for (std::size_t j = 0; j < 3; ++j) {
+        EXPECT_TRUE(inside(indices.first[j], truth.first[j]));
+        EXPECT_TRUE(inside(indices.total[j], truth.total[j]));
+    }
+    const SaltelliDesign lost(3, 16, 1);
+    const auto none = lost.indices(std::vector<double>(lost.points().size(), std::numeric_limits<double>::quiet_NaN()));
+    EXPECT_TRUE(std::isnan(none.first[0].value));
+}
+
+TEST(UnitSensitivity, AFunctionThatDoesNotVaryHasNoIndices) {
+    const SaltelliDesign design(2, 64, 1);
+    std::vector<double> values(design.points().size(), 3.7e5);
+    values[5] *= 1 + 1e-15;
+    const auto indices = design.indices(values);
+    EXPECT_EQ(indices.first[0].value, 0);
+    EXPECT_EQ(indices.total[1].upper_95, 0);
+}
+
+TEST(UnitSensitivity, SobolPointsAreEvenAndInsideTheCube) {
+    const int count = 256;
+    const auto points = sobol_points(count, 6, 7);
+    for (Eigen::Index j = 0; j < 6; ++j) {
+        std::set<int> cells;  // a net: each coordinate has one point in each of `count` equal parts
+        for (const Eigen::VectorXd& point : points) {
+            EXPECT_GT(point[j], 0);
+            EXPECT_LT(point[j], 1);
+            cells.insert(static_cast<int>(point[j] * count));
+        }
+        EXPECT_EQ(cells.size(), static_cast<std::size_t>(count));
+    }
+    EXPECT_NE(points[0], sobol_points(1, 6, 8)[0]);
+}
+
+// y = 3 x1 - 2 x2 + x3 x4: effects of x1 and x2 are constant, those of x3 are x4, which lies on four even levels.
+TEST(VerificationSensitivity, MorrisMeasuresOfAKnownFunction) {
+    const auto f = [](const Eigen::VectorXd& x) { return 3 * x[0] - 2 * x[1] + x[2] * x[3]; };
+    const MorrisDesign design(5, 2000, 1);
+    const auto measures = design.measures(values_at(design, f));
+    EXPECT_NEAR(measures.mu_star[0].value, 3, 1e-12);
+    EXPECT_NEAR(measures.mu_star[1].value, 2, 1e-12);
+    EXPECT_NEAR(measures.sigma[0].value, 0, 1e-10);
+    // Of 0, 1/3, 2/3, 1, within four standard errors at 2000 trajectories.
+    const double sigma = std::sqrt(5.0 / 36), fourth_moment = 41.0 / 1296;
+    EXPECT_NEAR(measures.mu_star[2].value, 0.5, 4 * sigma / std::sqrt(2000));
+    EXPECT_NEAR(measures.sigma[2].value, sigma, 4 * std::sqrt((fourth_moment - std::pow(sigma, 4)) / 8000) / sigma);
+    std::printf("Morris: mu* %.4f, exact 0.5; sigma %.4f, exact %.4f\n", measures.mu_star[2].value, measures.sigma[2].value, sigma);
+    EXPECT_EQ(measures.mu_star[4].value, 0);
+    for (const Eigen::VectorXd& x : design.points()) {
+        EXPECT_TRUE((x.array() >= 0).all() && (x.array() <= 1).all());
+    }
+}
+
+TEST(GradientSensitivity, LocalDerivativesAgreeWithCalculus) {
+    const auto f = [](const Eigen::VectorXd& x) { return std::exp(2 * x[0]) * std::cos(x[1]); };
+    for (const double x1 : {0.4, 0.0, 1.0}) {
+        const Eigen::Vector2d x(0.3, x1);
+        const LocalDesign design(x);
+        std::vector<double> values = values_at(design, f);
+        const auto derivatives = design.derivatives(values);
+        const double exact[] = {2 * f(x), -std::exp(0.6) * std::sin(x1)};
+        for (std::size_t j = 0; j < 2; ++j) {
+            EXPECT_NEAR(derivatives[j].value, exact[j], 1e-5);  // h^4 / 30 f''''' with h = 0.015, or four times as wide on one side
+            EXPECT_TRUE(inside(derivatives[j], exact[j]));
+        }
+        values[1] = std::numeric_limits<double>::quiet_NaN();
+        EXPECT_NEAR(design.derivatives(values)[0].value, exact[0], 1e-3);
+        values[2] = values[3] = values[1];
+        EXPECT_TRUE(std::isnan(design.derivatives(values)[0].value));
+    }
+}
+
+// Stands at 2 mm, jumps at 0.4 mm to 4 mm, stands to 0.8 mm, jumps to 6 mm and grows from there.
+Record staircase() {
+    Record record;
+    const auto add = [&](double u, double a) {
+        Instant row;
+        row.displacement = 1e-3 * u;
+        row.time = u + (record.series.empty() ? 0 : 1e-9);
+        row.crack_length = 1e-3 * a;
+        row.force = 40 * u / a;
+        record.series.push_back(row);
+    };
+    for (int i = 0; i <= 40; ++i) add(0.01 * i, 2);
+    for (int i = 40; i <= 80; ++i) add(0.01 * i, 4);
+    for (int i = 80; i <= 100; ++i) add(0.01 * i, 6 + 0.1 * (i - 80));
+    return record;
+}
+
+TEST(UnitOutputs, AreReadFromTheRecord) {
+    using Kind = StudyOutput::Kind;
+    const Record record = staircase();
+    const auto value = [&](Kind kind, double at = 0, int number = 0) { return output_of(record, {"", kind, at, number}); };
+    EXPECT_DOUBLE_EQ(value(Kind::peak_force), 8);
+    EXPECT_NEAR(value(Kind::initial_stiffness), 20e3, 1e-6);
+    EXPECT_DOUBLE_EQ(value(Kind::crack_length_at, 0.605e-3), 4e-3);
+    EXPECT_DOUBLE_EQ(value(Kind::force_at, 0.2e-3), 4);
+    EXPECT_TRUE(std::isnan(value(Kind::force_at, 2e-3)));
+    EXPECT_DOUBLE_EQ(value(Kind::arrest_length, 0, 1), 4e-3);
+    EXPECT_DOUBLE_EQ(value(Kind::arrest_displacement, 0, 1), 0.8e-3);
+    EXPECT_TRUE(std::isnan(value(Kind::arrest_length, 0, 2)));
+    double work = 0.5 * 8 * 0.4e-3 + 0.5 * (4 + 8) * 0.4e-3;
+    for (int i = 80; i < 100; ++i) {
+        work += 0.5 * (0.4 * i / (6 + 0.1 * (i - 80)) + 0.4 * (i + 1) / (6 + 0.1 * (i - 79))) * 0.01e-3;
+    }
+    EXPECT_NEAR(value(Kind::work_of_fracture), work, 1e-12);
+    Record whole = record;
+    whole.status = RunStatus::split;
+    EXPECT_EQ(output_of(whole, {"", Kind::force_at, 2e-3, 0}), 0);
+    EXPECT_DOUBLE_EQ(output_of(whole, {"", Kind::crack_length_at, 2e-3, 0}), 8e-3);
+}
+
+Study output_study(SensitivityMethod method, int samples) {
+    Study study = wedge_study(FakeWedge{});
+    study.scene = study.experiments[0].scene;
+    study.experiments.clear();
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0}, {"initial stiffness", StudyOutput::Kind::initial_stiffness, 0, 0}};
+    study.sensitivity = {method, samples};
+    return study;
+}
+
+SensitivityOptions wedge_options(int threads) {
+    SensitivityOptions options;
+    options.threads = threads;
+    options.forward = [](const Scene& scene, const std::atomic<bool>*) {
+        if (scramble(scene.materials.at("EW").toughness, 1) < 0.2) {
+            throw std::runtime_error("lost");
+        }
+        return FakeWedge{}(scene);
+    };
+    return options;
+}
+
+TEST(SystemSensitivity, GivesTheSameBitsForAnyNumberOfThreadsAndCountsFailedRuns) {
+    for (const auto method : {SensitivityMethod::local, SensitivityMethod::morris, SensitivityMethod::sobol}) {
+        const Study study = output_study(method, 16);
+        const Sensitivity one = study_sensitivity(study, wedge_options(1));
+        const Sensitivity four = study_sensitivity(study, wedge_options(4));
+        ASSERT_EQ(one.indices.size(), 8u);
+        for (std::size_t i = 0; i < one.indices.size(); ++i) {
+            const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
+            EXPECT_EQ(bits(one.indices[i].value), bits(four.indices[i].value));
+            EXPECT_EQ(bits(one.indices[i].lower_95), bits(four.indices[i].lower_95));
+        }
+        std::set<std::vector<double>> distinct;
+        for (const SensitivityRun& run : one.runs) {
+            EXPECT_TRUE(distinct.insert(run.parameters).second) << "run twice";
+            EXPECT_EQ(std::isnan(run.outputs[0]), run.status != "finished");
+        }
+        if (method == SensitivityMethod::sobol) {
+            EXPECT_NE(one.message.find("runs failed and are left out; the first: lost"), std::string::npos) << one.message;
+        }
+    }
+}
+
+TEST(SystemSensitivity, SaysSoWhenEveryRunFails) {
+    SensitivityOptions options;
+    options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::runtime_error("no luck"); };
+    const Sensitivity result = study_sensitivity(output_study(SensitivityMethod::sobol, 4), options);
+    EXPECT_EQ(result.status, SensitivityStatus::failed);
+    EXPECT_NE(result.message.find("no luck"), std::string::npos);
+    EXPECT_TRUE(std::isnan(result.indices.front().value));
+}
+
+TEST(UnitSensitivity, RefusesStudiesWithNothingToLookAt) {
+    const auto expect_refused = [](const Study& study, const std::string& key) {
+        try {
+            study_sensitivity(study, wedge_options(1));
+            FAIL() << key << " accepted";
+        } catch (const InputError& error) {
+            EXPECT_EQ(error.key, key);
+        }
+    };
+    Study study = output_study(SensitivityMethod::local, 0);
+    study.outputs.clear();
+    expect_refused(study, "outputs");
+    study = output_study(SensitivityMethod::local, 0);
+    study.parameters.clear();
+    expect_refused(study, "parameters");
+    study = output_study(SensitivityMethod::local, 0);
+    study.scene.reset();
+    expect_refused(study, "scene");
+}
+
+}  // namespace
+}  // namespace crampfit::testing
