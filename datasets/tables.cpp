@@ -282,6 +282,10 @@ Table orientation_table(const Specimen& specimen) {
             table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees),
                              fmt::format("{:.4f}", coherency)});
         }
+    }
+    return table;
+}
+
 // ---- tables of displacement fields, which may be too large to be held at once
 
 void print_points(const std::filesystem::path& file, std::ostream& out) {
@@ -320,6 +324,8 @@ std::vector<Offer> offers(const Specimen& specimen) {
     return {{"borders", [&] { return borders_table(specimen); }},
             {"rings", [&] { return rings_table(specimen); }},
             {"orientation", [&] { return orientation_table(specimen); }}};
+}
+
 Table image_table(const std::string& reference, const std::vector<std::string>& images) {
     Table table{{"image", "file"}, {"reference", reference}};
     for (std::size_t i = 0; i < images.size(); ++i)
