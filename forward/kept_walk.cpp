@@ -4,6 +4,7 @@
 #include "forward/trace.hpp"
 
 #include <chrono>
+#include <cmath>
 
 namespace crampfit {
 
@@ -23,7 +24,11 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options) {
     if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, numbers_);
     const int known = walk_->equilibria();
     std::vector<double> by;
-    for (const std::string& key : numbers_) by.push_back(get_number(scene, key) - get_number(scene_, key));
+    for (const std::string& key : numbers_) {
+        const double from = get_number(scene_, key);
+        const double to = get_number(scene, key);
+        by.push_back(from > 0.0 && to > 0.0 ? from * std::log(to / from) : to - from);
+    }
     walk_->shift(by);
     Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) {
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));

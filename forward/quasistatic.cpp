@@ -168,22 +168,31 @@ std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
     return found;
 }
 
-// Puts what the shift makes of a state in its place.
+// Puts what the shift makes of a state in its place. To first order; as powers of the numbers, which is exact where all the wood
+// becomes stiffer by the same factor, and where a value would change too much for that, linearly.
 void Quasistatic::show_shifted(std::size_t number, int time) {
+    constexpr double most = 2.0;  // change of the logarithm
     Place& place = places_[number];
     LoadState state = place.states.at(time);
-    for (std::size_t n = 0; n < shift_.size(); ++n) {
-        const LoadState& slope = place.slopes.at(time)[n];
-        state.potential += shift_[n] * slope.potential;
-        state.power += shift_[n] * slope.power;
-        state.displacement += shift_[n] * slope.displacement;
-        for (std::size_t d = 0; d < state.reactions.size(); ++d) state.reactions[d] += shift_[n] * slope.reactions[d];
-    }
+    const std::vector<LoadState>& slopes = place.slopes.at(time);
+    const auto move = [&](double& value, auto slope_of) {
+        double change = 0.0;
+        for (std::size_t n = 0; n < shift_.size(); ++n) change += shift_[n] * slope_of(slopes[n]);
+        if (std::abs(change) <= most * std::abs(value)) value *= std::exp(value != 0.0 ? change / value : 0.0);
+        else value += change;
+    };
+    move(state.potential, [](const LoadState& s) { return s.potential; });
+    move(state.power, [](const LoadState& s) { return s.power; });
+    move(state.displacement, [](const LoadState& s) { return s.displacement; });
+    for (std::size_t d = 0; d < state.reactions.size(); ++d)
+        for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
     place.station.states[time] = std::move(state);
 }
 
 void Quasistatic::shift(const std::vector<double>& by) {
+    const std::vector<double> before = shift_;
     shift_ = std::any_of(by.begin(), by.end(), [](double d) { return d != 0.0; }) ? by : std::vector<double>{};
+    if (shift_ == before) return;
     for (Place& place : places_) {
         place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
         place.station.ahead.clear();

@@ -28,7 +28,8 @@ class Quasistatic {
     Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {});
     ~Quasistatic();
 
-    /// From now on all states are as they would be with the numbers shifted by so much, to first order; the crack's way stays.
+    /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
+    /// of each number.
     void shift(const std::vector<double>& by);
 
     /// Follows the crack to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip

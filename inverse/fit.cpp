@@ -8,6 +8,7 @@
 #include "inverse/search.hpp"
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
+#include "inverse/walk_descent.hpp"
 
 #include <fmt/format.h>
 
@@ -16,11 +17,13 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <optional>
 
 namespace crampfit {
 namespace {
 
 constexpr double bound_tolerance = 1e-4;  // of the box
+constexpr int most_cheap_runs = 1000000;  // of those that take milliseconds
 
 // Displacements at which a crack moves differ by this much from grid to grid: in explicit dynamics for vibration and for arrests
 // between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
@@ -153,8 +156,15 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
-    const StudyModel model(study, own ? forward_with_kept_walks(study) : options.forward, own ? solver_resolution : 0.0,
-                           options.stop_requested);
+    const KeptWalks walks(study);
+    const StudyModel model(study, own ? walks.exact() : options.forward, own ? solver_resolution : 0.0, options.stop_requested);
+    const bool only_toughness = own && walks.only_toughness();
+    const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
+    const Near near = [&](const Eigen::VectorXd& point) -> Objective::Evaluate {
+        const Eigen::VectorXd values = model.box().values(point);
+        auto close = std::make_shared<StudyModel>(study, walks.near({values.begin(), values.end()}), solver_resolution, options.stop_requested);
+        return [close](const Eigen::VectorXd& x, int threads) { return close->evaluate(x, threads); };
+    };
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
@@ -168,8 +178,10 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
     const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
     objective.set_budget_left(study.optimizer.max_runs - reserve);
-    const SearchResult found = search(objective, study.optimizer, box.initial(), options.seed,
-                                      [&](const std::string& stage) { reporter.set_stage(stage); });
+    const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
+    const SearchResult found =
+        by_walks ? descend_by_walks(objective, near, box.initial(), options.seed, stage)
+                 : search(objective, study.optimizer, box.initial(), options.seed, stage);
     objective.set_budget_left(objective.budget_left() + reserve);
 
     Fit fit;
@@ -186,21 +198,27 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         for (const Parameter& parameter : study.parameters) {
             names.push_back(parameter.name);
         }
-        const auto estimate = [&] { return estimate_uncertainty(objective, model.curve_lengths(), names); };
+        // Near the best point runs are cheap where the simulation has derivatives.
+        std::optional<Objective> close;
+        if (by_walks) {
+            close.emplace(box.size(), near(objective.best()->x), most_cheap_runs, objective.threads(), options.stop_requested);
+            spread_about(*close, objective.best()->x, options.seed);
+        }
+        Objective& around = close ? *close : objective;
+        const auto estimate = [&] { return estimate_uncertainty(around, model.curve_lengths(), names); };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
                 return Exploration();
             }
-            const bool cheap = own ? runs_share_walks(study) : options.cheap_runs;
+            const bool cheap = own ? only_toughness || by_walks : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
-            return explore(objective, about, study.uncertainty, stations, cheap, options.seed,
-                           [&](const std::string& stage) { reporter.set_stage(stage); });
+            return explore(around, about, study.uncertainty, stations, cheap, options.seed, stage);
         };
         Uncertainty uncertainty = estimate();
         Exploration exploration = look_around(uncertainty);
         // It may have come upon a better point. About that one, then, where it is not as good as the same.
         const double gain = uncertainty.best.evaluation->misfit - objective.best()->evaluation->misfit;
-        if (gain > 0.02 * uncertainty.widening) {
+        if (!close && gain > 0.02 * uncertainty.widening) {
             objective.set_budget_left(reserve);
             uncertainty = estimate();
             exploration = look_around(uncertainty);
@@ -212,6 +230,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.message = explain(fit.status);
         fill_parameters(fit, box, best.x, uncertainty);
         fit.message += uncertainty.message;
+        if (close && !only_toughness) {
+            fit.message += "What is said of intervals rests on runs moved from the best one by its derivatives. ";
+        }
         fill_exploration(fit, box, uncertainty, exploration);
         fit.misfit = best.evaluation->misfit;
         fit.reduced_chi_square = uncertainty.reduced_chi_square;

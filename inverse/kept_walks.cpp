@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <deque>
-#include <memory>
 #include <mutex>
 
 namespace crampfit {
@@ -17,49 +16,89 @@ namespace {
 // Walks that are kept at a time: a fit of moduli leaves each one behind after a few runs.
 constexpr std::size_t most_walks = 6;
 
-class Walks {
+struct Setting {
+    std::string key;
+    std::size_t parameter;
+    double initial;  // SI
+};
+
+bool has(const Scene& scene, const std::string& key) {
+    try {
+        get_number(scene, key);
+        return true;
+    } catch (const InputError&) {
+        return false;  // another scene's key
+    }
+}
+
+}  // namespace
+
+class KeptWalks::Store {
   public:
-    explicit Walks(const Study& study) {
-        for (const Parameter& parameter : study.parameters) {
-            for (const std::string& key : parameter.keys) {
-                if (key.ends_with(".toughness")) {
-                    toughness_.emplace_back(key, parameter.initial);
-                } else {
-                    keys_.push_back(key);
-                }
+    explicit Store(const Study& study) {
+        for (const Scene* scene : scenes_of(study)) {
+            scenes_.push_back(scene);
+        }
+        for (std::size_t j = 0; j < study.parameters.size(); ++j) {
+            for (const std::string& key : study.parameters[j].keys) {
+                (key.ends_with(".toughness") ? toughness_ : others_).push_back({key, j, study.parameters[j].initial});
             }
         }
     }
 
-    Record run(const Scene& scene, const std::atomic<bool>* stop) {
-        SimulateOptions options;
-        options.stop_requested = stop;
-        const std::shared_ptr<KeptWalk> walk = walk_of(scene);
-        return walk->reusable() ? walk->run(scene, options) : simulate(scene, options);
+    Record run(const Scene& scene, const std::atomic<bool>* stop) { return run(scene, scene, stop); }
+
+    // On the walk of the scene with other values.
+    Record run_near(const std::vector<double>& values, const Scene& scene, const std::atomic<bool>* stop) {
+        Scene base = scene;
+        for (const Setting& setting : others_) {
+            if (has(base, setting.key)) {
+                set_number(base, setting.key, values[setting.parameter]);
+            }
+        }
+        return run(base, scene, stop);
+    }
+
+    bool only_toughness() const {
+        return others_.empty() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
+    }
+
+    bool has_slopes() const {
+        const bool of_wood = std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
+        return of_wood && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
     }
 
   private:
+    Record run(const Scene& base, const Scene& scene, const std::atomic<bool>* stop) {
+        SimulateOptions options;
+        options.stop_requested = stop;
+        const std::shared_ptr<KeptWalk> walk = walk_of(base);
+        return walk->reusable() ? walk->run(scene, options) : simulate(scene, options);
+    }
+
     // What tells walks apart: the scene as it was read, and what the fit has changed in it.
     std::string name_of(const Scene& scene) const {
         std::string name = scene.file.string() + '\n' + scene.text;
-        for (const std::string& key : keys_) {
-            try {
-                name += fmt::format("\n{}={}", key, get_number(scene, key));
-            } catch (const InputError&) {
-                name += "\n" + key + " is not here";  // another scene's key
-            }
+        for (const Setting& setting : others_) {
+            name += has(scene, setting.key) ? fmt::format("\n{}={}", setting.key, get_number(scene, setting.key))
+                                            : "\n" + setting.key + " is not here";
         }
         return name;
     }
 
-    Scene with_initial_toughness(Scene scene) const {
-        for (const auto& [key, value] : toughness_) {
-            try {
-                set_number(scene, key, value);
-            } catch (const InputError&) {  // another scene's key
+    std::shared_ptr<KeptWalk> new_walk(Scene scene) const {
+        for (const Setting& setting : toughness_) {
+            if (has(scene, setting.key)) {
+                set_number(scene, setting.key, setting.initial);
             }
         }
-        return scene;
+        std::vector<std::string> numbers;
+        for (const Setting& setting : others_) {
+            if (setting.key.starts_with("materials.") && has(scene, setting.key)) {
+                numbers.push_back(setting.key);
+            }
+        }
+        return std::make_shared<KeptWalk>(scene, numbers);
     }
 
     std::shared_ptr<KeptWalk> walk_of(const Scene& scene) {
@@ -70,36 +109,31 @@ class Walks {
                 return walk;
             }
         }
-        walks_.emplace_back(name, std::make_shared<KeptWalk>(with_initial_toughness(scene)));
-        if (walks_.size() > most_walks) {
+        walks_.emplace_back(name, new_walk(scene));
+        if (walks_.size() > std::max(most_walks, 2 * scenes_.size())) {
             walks_.pop_front();
         }
         return walks_.back().second;
     }
 
-    std::vector<std::string> keys_;                           // all but toughnesses
-    std::vector<std::pair<std::string, double>> toughness_;  // key and initial value [J/m^2]
+    std::vector<const Scene*> scenes_;
+    std::vector<Setting> toughness_, others_;
     std::mutex mutex_;
     std::deque<std::pair<std::string, std::shared_ptr<KeptWalk>>> walks_;
 };
 
-}  // namespace
+KeptWalks::KeptWalks(const Study& study) : store_(std::make_shared<Store>(study)) {}
+KeptWalks::~KeptWalks() = default;
 
-Forward forward_with_kept_walks(const Study& study) {
-    auto walks = std::make_shared<Walks>(study);
-    return [walks](const Scene& scene, const std::atomic<bool>* stop) { return walks->run(scene, stop); };
+Forward KeptWalks::exact() const {
+    return [store = store_](const Scene& scene, const std::atomic<bool>* stop) { return store->run(scene, stop); };
 }
 
-bool runs_share_walks(const Study& study) {
-    for (const Parameter& parameter : study.parameters) {
-        for (const std::string& key : parameter.keys) {
-            if (!key.ends_with(".toughness")) {
-                return false;
-            }
-        }
-    }
-    const auto scenes = scenes_of(study);
-    return std::all_of(scenes.begin(), scenes.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
+Forward KeptWalks::near(const std::vector<double>& values) const {
+    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, stop); };
 }
+
+bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
+bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
 
 }  // namespace crampfit

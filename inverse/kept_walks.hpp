@@ -3,14 +3,34 @@
 #include "datasets/experiment.hpp"
 #include "inverse/forward.hpp"
 
+#include <memory>
+
 namespace crampfit {
 
 /// The forward solver as a fit calls it: runs that differ from a recent one by toughness alone share its equilibria. How a
-/// walk is modelled (linear or not) follows from the parameters' initial toughnesses, whichever run comes first. May be called from
-/// several threads.
-Forward forward_with_kept_walks(const Study& study);
+/// walk is modelled (linear or not) follows from the parameters' initial toughnesses, whichever run comes first. All may be called
+/// from several threads.
+class KeptWalks {
+  public:
+    explicit KeptWalks(const Study& study);
+    ~KeptWalks();
 
-/// Whether all runs of a study are other toughnesses on walks that are kept, and cost milliseconds.
-bool runs_share_walks(const Study& study);
+    /// The simulation itself, on a walk of its own where the scene has other moduli than any that is kept.
+    Forward exact() const;
+
+    /// The simulation near a point of the study, `values` of its parameters, on the walk of that point: exact for toughness, to first
+    /// order for all other parameters, which takes milliseconds once that walk is there.
+    Forward near(const std::vector<double>& values) const;
+
+    /// Whether all runs of the study are other toughnesses on walks that are kept, and cost milliseconds.
+    bool only_toughness() const;
+
+    /// Whether walks have derivatives by all other parameters.
+    bool has_slopes() const;
+
+  private:
+    class Store;
+    std::shared_ptr<Store> store_;
+};
 
 }  // namespace crampfit

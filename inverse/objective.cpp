@@ -28,6 +28,8 @@ Objective::Objective(Eigen::Index parameters, Evaluate evaluate, int budget, int
     shared_->on_run = std::move(on_run);
 }
 
+const std::atomic<bool>* Objective::stop() const { return shared_->stop; }
+
 bool Objective::stopped() const { return shared_->stop && shared_->stop->load(); }
 
 std::shared_ptr<const Evaluation> Objective::run(const Eigen::VectorXd& point, int threads) const {

@@ -59,6 +59,7 @@ class Objective {
     int budget_left() const { return budget_ - spent_; }
     void set_budget_left(int runs) { budget_ = spent_ + runs; }
     bool stopped() const;  // the user wants an end
+    const std::atomic<bool>* stop() const;
     bool exhausted() const { return stopped() || budget_left() <= 0; }
 
   private:

@@ -241,7 +241,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     options.validate();
     check_sensitivity_study(study);
     const auto begin = std::chrono::steady_clock::now();
-    const OutputModel model(study, options.forward ? options.forward : forward_with_kept_walks(study),
+    const OutputModel model(study, options.forward ? options.forward : KeptWalks(study).exact(),
                             options.stop_requested);
     Sensitivity result;
     result.seed = options.seed;

@@ -1,0 +1,98 @@
+#include "inverse/walk_descent.hpp"
+
+#include "inverse/differences.hpp"
+#include "inverse/minimize.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+namespace {
+
+// Parts of the box.
+constexpr double first_radius = 0.2;
+constexpr double last_radius = 0.03;
+constexpr double least_radius = 1e-4;
+constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
+
+constexpr int points_a_parameter = 12;  // of a spread: they average over the kinks that jumps make
+constexpr int model_descents = 2;
+constexpr int runs_of_descent = 400;
+
+// What lies within a radius of a centre along each axis, as a unit cube.
+struct Window {
+    Eigen::VectorXd low, high;
+
+    Window(const Eigen::VectorXd& centre, double radius)
+        : low((centre.array() - radius).cwiseMax(0.0)), high((centre.array() + radius).cwiseMin(1.0)) {}
+    Eigen::VectorXd inside(const Eigen::VectorXd& y) const { return low + y.cwiseProduct(high - low); }
+    Eigen::VectorXd share(const Eigen::VectorXd& x) const {
+        return (x - low).cwiseQuotient((high - low).cwiseMax(1e-300)).cwiseMax(0.0).cwiseMin(1.0);
+    }
+};
+
+// The lowest point of the model in the window.
+Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
+    const int model_starts = 2 * static_cast<int>(centre.size()) + 2;
+    Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
+                    model_starts + model_descents * runs_of_descent, objective.threads(), objective.stop());
+    std::vector<Eigen::VectorXd> starts{window.share(centre)};
+    for (int i = 1; i < model_starts; ++i) {
+        starts.push_back(halton(i, centre.size(), seed));
+    }
+    cheap.at(starts);
+    std::vector<Run> order = cheap.runs();
+    std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
+    for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
+        Objective branch = cheap.branch(runs_of_descent, objective.threads());
+        minimize(branch, order[static_cast<std::size_t>(i)].x, {"sbplx", seed});
+        cheap.join(branch);
+    }
+    const Run* best = cheap.best();
+    return best ? Run{window.inside(best->x), best->evaluation} : Run{centre, std::make_shared<Evaluation>()};
+}
+
+}  // namespace
+
+void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed) {
+    std::vector<Eigen::VectorXd> points{x};
+    for (int i = 1; i <= points_a_parameter * static_cast<int>(x.size()); ++i) {
+        const Eigen::VectorXd away = difference_reach * (2.0 * halton(i, x.size(), seed).array() - 1.0);
+        points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
+    }
+    objective.at(points);
+}
+
+SearchResult descend_by_walks(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed,
+                              const std::function<void(const std::string&)>& stage) {
+    stage("descent");
+    SearchResult result;
+    result.method = "auto: steps to the lowest point nearby, each confirmed by a run. Nearby, equilibria that are known serve other "
+                    "toughnesses as they are, and other moduli moved by their exact derivatives. Chosen because all parameters are such.";
+    objective.at(initial);
+    double radius = first_radius;
+    while (objective.best() && !objective.exhausted()) {
+        const Run here = *objective.best();
+        const Objective::Evaluate model = near(here.x);
+        const Run trial = lowest(model, Window(here.x, radius), here.x, objective, seed);
+        const double expected = here.evaluation->misfit - trial.evaluation->misfit;
+        if (!(expected > least_gain * here.evaluation->misfit)) {
+            result.converged = !objective.stopped();
+            result.method += fmt::format(" {} runs.", objective.runs().size());
+            return result;
+        }
+        objective.at(trial.x);
+        const double gain = here.evaluation->misfit - objective.best()->evaluation->misfit;
+        const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
+        radius = gain < 0.25 * expected ? 0.25 * std::min(radius, step) : std::clamp(2.0 * step, last_radius, first_radius);
+        if (radius < least_radius) {
+            result.converged = true;
+            break;
+        }
+    }
+    return result;
+}
+
+}  // namespace crampfit

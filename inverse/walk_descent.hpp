@@ -1,0 +1,23 @@
+#pragma once
+
+#include "inverse/objective.hpp"
+#include "inverse/search.hpp"
+
+#include <functional>
+
+namespace crampfit {
+
+/// The study near a point [parameters], cheap: exact in some parameters, to first order in the others.
+using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
+
+/// Least squares where a run leaves behind a cheap model of the runs nearby, exact in some parameters and to first order in the
+/// others: each step searches that model within a trust region, runs the study where the model is lowest, and goes on from there if
+/// that is lower (Conn, Gould and Toint 2000, algorithm 6.1.1). The model is searched from several points, so that a curve
+/// with jumps does not easily catch it in a side valley; far away it is not asked, as every new load costs equilibria.
+SearchResult descend_by_walks(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed,
+                              const std::function<void(const std::string&)>& stage);
+
+/// Runs a cheap model at points spread evenly about a point, within the reach of differences.
+void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed);
+
+}  // namespace crampfit

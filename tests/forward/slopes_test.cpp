@@ -1,0 +1,146 @@
+// Derivatives of what a record shows by the numbers of the materials, against central differences of whole runs.
+#include "datasets/io.hpp"
+#include "forward/kept_walk.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::test {
+namespace {
+
+const std::vector<std::string> numbers{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu"};
+
+// A crack that runs straight across rings with transition wood. Straight: derivatives are those on the path as it is.
+Scene across_rings(double cell) {
+    Scene scene = ring_specimen(2.5e-3, cell);
+    scene.specimen.rings->transition = 0.3e-3;
+    scene.materials["LW"].density = 750.0;
+    scene.solver = {};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.stop = {};
+    scene.stop.displacement = 1e-3;
+    scene.edges[0] = moving("top", Side::top, {0.0, 1e-3 / 60.0});
+    scene.cracks[0].grows = Growth::end;
+    scene.cracks[0].advance = 2.0 * cell;
+    scene.cracks[0].direction = GrowthDirection::straight;
+    scene.output.frames = 0;
+    return scene;
+}
+
+// Wheels in a notch, a pin below: contact and finite rotation.
+Scene wedge_across_rings(double cell) {
+    Scene scene = across_rings(cell);
+    scene.specimen.rings->pith = {5e-3, 30e-3};
+    scene.specimen.cutouts = {Polygon{{{3.5e-3, 10e-3}, {6.5e-3, 10e-3}, {5e-3, 7e-3}}}};
+    scene.edges.clear();
+    const auto body = [](const char* name, Vec2 centre, Contact::Kind contact, Vec2 velocity) {
+        Body made;
+        made.name = name;
+        made.shape = Circle{centre, 0.5e-3};
+        made.contact.kind = contact;
+        made.velocity = velocity;
+        return made;
+    };
+    const Vec2 down(0.0, -1e-3 / 60.0);
+    scene.bodies = {body("left", {4.4472e-3, 9.2236e-3}, Contact::Kind::frictionless, down),
+                    body("right", {5.5528e-3, 9.2236e-3}, Contact::Kind::frictionless, down),
+                    body("pin", {5e-3, 0.0}, Contact::Kind::bonded, Vec2::Zero())};
+    scene.cracks[0].points = {{5e-3, 7e-3}, {5e-3, 5.9e-3}};
+    scene.measure = {"pin", "left"};
+    scene.stop.displacement = 0.8e-3;
+    return scene;
+}
+
+struct Errors {
+    double force = 0, length = 0, displacement = 0;  // largest, of the largest derivative
+};
+
+// Row by row: force, crack length and displacement as functions of the logarithm of a number.
+Errors against_differences(const Scene& scene, KeptWalk& walk, const std::string& key, double step) {
+    const double value = get_number(scene, key);
+    const auto at = [&](double change) {
+        Scene other = scene;
+        set_number(other, key, value * (1.0 + change));
+        return other;
+    };
+    constexpr double small = 1e-6;
+    const Record more = walk.run(at(small), {}), less = walk.run(at(-small), {});
+    const Record far_more = KeptWalk(at(step)).run(at(step), {}), far_less = KeptWalk(at(-step)).run(at(-step), {});
+    EXPECT_EQ(more.series.size(), far_more.series.size()) << "an event lies between: choose another scene";
+    EXPECT_EQ(less.series.size(), far_less.series.size());
+    const auto error = [&](auto column) {
+        double worst = 0, largest = 0;
+        const std::size_t rows = std::min({more.series.size(), less.series.size(), far_more.series.size(), far_less.series.size()});
+        for (std::size_t i = 0; i < rows; ++i) {
+            const double slope = (column(more.series[i]) - column(less.series[i])) / (2.0 * small);
+            const double difference = (column(far_more.series[i]) - column(far_less.series[i])) / (2.0 * step);
+            worst = std::max(worst, std::abs(slope - difference));
+            largest = std::max(largest, std::abs(difference));
+        }
+        EXPECT_GT(largest, 0.0) << key;
+        return worst / largest;
+    };
+    return {error([](const Instant& row) { return row.force; }), error([](const Instant& row) { return row.crack_length; }),
+            error([](const Instant& row) { return row.displacement; })};
+}
+
+void check(const char* name, const Scene& scene, double step, double tolerance) {
+    KeptWalk walk(scene, numbers);
+    ASSERT_TRUE(walk.has_slopes());
+    walk.run(scene, {});
+    std::vector<std::string> keys = numbers;
+    keys.insert(keys.end(), {"materials.EW.toughness", "materials.LW.toughness"});
+    for (const std::string& key : keys) {
+        const Errors errors = against_differences(scene, walk, key, step);
+        std::printf("%s, %s: force %.1e, crack length %.1e, displacement %.1e\n", name, key.c_str(), errors.force, errors.length,
+                    errors.displacement);
+        EXPECT_LT(errors.force, tolerance) << key;
+        EXPECT_LT(errors.length, tolerance) << key;
+        EXPECT_LT(errors.displacement, tolerance) << key;
+    }
+}
+
+TEST(GradientRecord, AcrossRings) {
+    // Central differences with a step of 1e-4 are off by some 1e-8.
+    check("linear", across_rings(0.4e-3), 1e-4, 1e-5);
+}
+
+TEST(GradientRecord, OfAWedgeTest) {
+    // Newton's method leaves 1e-7 of the largest force at most out of balance, which a step of 1e-3 makes 1e-4 of the
+    // difference at most; truncation is of the order of 1e-6.
+    check("wedge", wedge_across_rings(0.4e-3), 1e-3, 1e-4);
+}
+
+TEST(GradientRecord, TractionMovesItsEdge) {
+    Scene scene = across_rings(0.4e-3);
+    scene.cracks[0].grows = Growth::none;
+    scene.stop = {};
+    scene.stop.time = 1.0;
+    scene.edges[0] = pulled("top", Side::top, {0.0, 0.1e6});
+    KeptWalk walk(scene, numbers);
+    for (const std::string& key : numbers) {
+        const double value = get_number(scene, key);
+        const auto displacement = [&](KeptWalk& on, double change) {
+            Scene other = scene;
+            set_number(other, key, value * (1.0 + change));
+            return on.run(other, {}).series.back().displacement;
+        };
+        const auto anew = [&](double change) {
+            Scene other = scene;
+            set_number(other, key, value * (1.0 + change));
+            KeptWalk own(other);
+            return displacement(own, change);
+        };
+        const double slope = (displacement(walk, 1e-6) - displacement(walk, -1e-6)) / 2e-6;
+        const double difference = (anew(1e-4) - anew(-1e-4)) / 2e-4;
+        std::printf("traction, %s: %.6e m, by differences %.6e m\n", key.c_str(), slope, difference);
+        EXPECT_NEAR(slope, difference, 1e-5 * std::abs(difference)) << key;
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::test
