@@ -19,7 +19,7 @@ constexpr double least_freed = 0.02;
 constexpr double face_stiffness_factor = 100.0;
 
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node.
-constexpr double balance = 1e-7;
+constexpr double balance = 1e-9;
 constexpr int most_iterations = 60;
 // Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below, against
 // 1e-3 of a held one.

@@ -13,8 +13,6 @@ namespace {
 // difference makes a value that is zero look like something.
 constexpr double resolution = 1e-3;
 
-constexpr double widest = 4 * difference_step;  // differences, a part of the box
-
 Directions take_apart(const Run& best, const LocalModel& model, double radius) {
     const Eigen::MatrixXd jacobian = model.jacobian();
     Directions result{best, model, radius, {}, {}, {}, {}, {}};
@@ -45,14 +43,14 @@ bool Directions::all_resolved() const {
     return true;
 }
 
-std::optional<Directions> directions_about_best(Objective& objective) {
+std::optional<Directions> directions_about_best(Objective& objective, double step) {
     std::optional<Directions> found;
-    double radius = difference_step;
-    while (radius <= widest) {
+    double radius = step;
+    while (radius <= 4 * step) {
         const Run best = *objective.best();
         objective.at(stencil(best.x, radius));
         if (objective.best()->x != best.x) {
-            radius = difference_step;  // a better run: about that one, then
+            radius = step;  // a better run: about that one, then
             found.reset();
             continue;
         }

@@ -29,6 +29,6 @@ struct Directions {
 /// Runs the differences about the best run that have not been run yet, and takes wider ones where the model's scatter
 /// hides a slope. A difference that turns out better than the best run takes its place. Absent where too few runs near
 /// it ended well. There must be a usable run.
-std::optional<Directions> directions_about_best(Objective& objective);
+std::optional<Directions> directions_about_best(Objective& objective, double step);
 
 }  // namespace crampfit

@@ -1,6 +1,7 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/differences.hpp"
 #include "inverse/explore.hpp"
 #include "inverse/kept_walks.hpp"
 #include "inverse/lack_of_fit.hpp"
@@ -205,7 +206,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             spread_about(*close, objective.best()->x, options.seed);
         }
         Objective& around = close ? *close : objective;
-        const auto estimate = [&] { return estimate_uncertainty(around, model.curve_lengths(), names); };
+        const auto estimate = [&] { return estimate_uncertainty(around, model.curve_lengths(), names, close ? smooth_step : difference_step); };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
                 return Exploration();

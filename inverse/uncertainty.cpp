@@ -129,8 +129,8 @@ double student_975(int degrees_of_freedom) {
 }
 
 Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names) {
-    const auto directions = directions_about_best(objective);
+                                 const std::vector<std::string>& names, double step) {
+    const auto directions = directions_about_best(objective, step);
     Uncertainty result;
     result.best = *objective.best();
     const Eigen::VectorXd& x = result.best.x;

@@ -24,7 +24,8 @@ struct Uncertainty {
 
 /// Intervals about the best run, from how the residuals change with the parameters near it. Runs the differences about
 /// the best point that have not been run yet. `curve_lengths` are the lengths of the measured curves, in the order in
-/// which the residuals hold them; priors follow. `names` are the parameters'. There must be a usable run.
+/// which the residuals hold them; priors follow. `names` are the parameters'; `step` is that of differences, a part of the box. There
+/// must be a usable run.
 ///
 /// covariance = s (J^T J)^-1 + V, J being the slope of a polynomial fitted to the runs about the best point and
 ///  s = max(1, chi^2 tau), chi^2 the reduced chi-square and tau the correlation time of the residuals along their
@@ -37,7 +38,7 @@ struct Uncertainty {
 /// the variance of a uniform distribution over the box, and the parameters that it is made of get the whole box as
 /// their interval.
 Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names);
+                                 const std::vector<std::string>& names, double step);
 
 /// The 97.5 % point of Student's t distribution.
 double student_975(int degrees_of_freedom);

@@ -1,7 +1,8 @@
 #include "inverse/walk_descent.hpp"
 
-#include "inverse/differences.hpp"
 #include "inverse/minimize.hpp"
+
+#include <Eigen/Cholesky>
 
 #include <fmt/format.h>
 
@@ -19,7 +20,10 @@ constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, fa
 
 constexpr int points_a_parameter = 12;  // of a spread: they average over the kinks that jumps make
 constexpr int model_descents = 2;
-constexpr int runs_of_descent = 400;
+constexpr int runs_across_kinks = 120;
+constexpr int most_polishing_steps = 15;
+constexpr double polishing_difference = 1e-5;
+constexpr int most_cheap_runs = 100000;
 
 // What lies within a radius of a centre along each axis, as a unit cube.
 struct Window {
@@ -33,11 +37,52 @@ struct Window {
     }
 };
 
+// Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
+void polish(Objective& cheap, Eigen::VectorXd y) {
+    const auto size = y.size();
+    auto here = cheap.at(y);
+    double damping = 1e-4;
+    for (int step = 0; step < most_polishing_steps && here && here->usable(); ++step) {
+        Eigen::MatrixXd slopes(here->residuals.size(), size);
+        for (Eigen::Index j = 0; j < size; ++j) {
+            Eigen::VectorXd aside = y;
+            aside[j] += y[j] < 0.5 ? polishing_difference : -polishing_difference;
+            const auto there = cheap.at(aside);
+            if (!there || !there->usable()) {
+                return;
+            }
+            slopes.col(j) = (there->residuals - here->residuals) / (aside[j] - y[j]);
+        }
+        const Eigen::MatrixXd normal = slopes.transpose() * slopes;
+        const Eigen::VectorXd gradient = slopes.transpose() * here->residuals;
+        bool lower = false;
+        for (int trial = 0; trial < 6 && !lower; ++trial) {
+            Eigen::MatrixXd damped = normal;
+            damped.diagonal() += damping * normal.diagonal().cwiseMax(1e-12 * normal.diagonal().maxCoeff());
+            const Eigen::VectorXd next = (y - damped.ldlt().solve(gradient)).cwiseMax(0.0).cwiseMin(1.0);
+            const auto there = cheap.at(next);
+            lower = there && there->usable() && there->misfit < here->misfit;
+            damping *= lower ? 0.1 : 10.0;
+            if (lower) {
+                const double gain = 1.0 - there->misfit / here->misfit;
+                y = next;
+                here = there;
+                if (gain < 0.1 * least_gain) {
+                    return;
+                }
+            }
+        }
+        if (!lower) {
+            return;
+        }
+    }
+}
+
 // The lowest point of the model in the window.
 Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
     const int model_starts = 2 * static_cast<int>(centre.size()) + 2;
     Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
-                    model_starts + model_descents * runs_of_descent, objective.threads(), objective.stop());
+                    most_cheap_runs, objective.threads(), objective.stop());
     std::vector<Eigen::VectorXd> starts{window.share(centre)};
     for (int i = 1; i < model_starts; ++i) {
         starts.push_back(halton(i, centre.size(), seed));
@@ -46,9 +91,14 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
     std::vector<Run> order = cheap.runs();
     std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
     for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
-        Objective branch = cheap.branch(runs_of_descent, objective.threads());
-        minimize(branch, order[static_cast<std::size_t>(i)].x, {"sbplx", seed});
+        polish(cheap, order[static_cast<std::size_t>(i)].x);
+    }
+    if (cheap.best()) {  // across kinks, where slopes mislead
+        Objective branch = cheap.branch(runs_across_kinks, objective.threads());
+        minimize(branch, cheap.best()->x, {"sbplx", seed});
         cheap.join(branch);
+        const Eigen::VectorXd best = cheap.best()->x;
+        polish(cheap, best);
     }
     const Run* best = cheap.best();
     return best ? Run{window.inside(best->x), best->evaluation} : Run{centre, std::make_shared<Evaluation>()};
@@ -59,7 +109,7 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
 void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed) {
     std::vector<Eigen::VectorXd> points{x};
     for (int i = 1; i <= points_a_parameter * static_cast<int>(x.size()); ++i) {
-        const Eigen::VectorXd away = difference_reach * (2.0 * halton(i, x.size(), seed).array() - 1.0);
+        const Eigen::VectorXd away = 1.5 * smooth_step * (2.0 * halton(i, x.size(), seed).array() - 1.0);
         points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
     }
     objective.at(points);

@@ -52,6 +52,7 @@ Scene wedge_across_rings(double cell) {
     scene.cracks[0].points = {{5e-3, 7e-3}, {5e-3, 5.9e-3}};
     scene.measure = {"pin", "left"};
     scene.stop.displacement = 0.8e-3;
+    scene.output.samples = 60;  // few rows: no corner of the curve passes one within the step
     return scene;
 }
 
@@ -110,9 +111,9 @@ TEST(GradientRecord, AcrossRings) {
 }
 
 TEST(GradientRecord, OfAWedgeTest) {
-    // Newton's method leaves 1e-7 of the largest force at most out of balance, which a step of 1e-3 makes 1e-4 of the
-    // difference at most; truncation is of the order of 1e-6.
-    check("wedge", wedge_across_rings(0.4e-3), 1e-3, 1e-4);
+    // Newton's method leaves less than 1e-9 of the largest force out of balance, which the step makes 1e-5 of a difference.
+    // A wider step would take corners of the curve past the times of the rows.
+    check("wedge", wedge_across_rings(0.4e-3), 1e-4, 1e-5);
 }
 
 TEST(GradientRecord, TractionMovesItsEdge) {
