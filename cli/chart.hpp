@@ -64,7 +64,7 @@ ScaledUnit unit_for(const std::vector<double>& values, const std::vector<ScaledU
 
 namespace units {
 inline const std::vector<ScaledUnit> time{{1, "s"}, {1e-3, "ms"}, {1e-6, "µs"}};
-inline const std::vector<ScaledUnit> length{{1e-3, "mm"}, {1e-6, "µm"}};
+inline const std::vector<ScaledUnit> length{{1e-3, "mm"}};
 inline const std::vector<ScaledUnit> force{{1e3, "kN"}, {1, "N"}, {1e-3, "mN"}};
 inline const std::vector<ScaledUnit> energy{{1, "J"}, {1e-3, "mJ"}, {1e-6, "µJ"}};
 inline const std::vector<ScaledUnit> stress{{1e6, "MPa"}, {1e3, "kPa"}, {1, "Pa"}};

@@ -18,6 +18,7 @@ h2 { font-size: 1.1rem; border-bottom: 1px solid #d0d0d0; padding-bottom: 0.2rem
 .warning { border-left: 4px solid #d55e00; background: #fdf3ec; padding: 0.4rem 0.8rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 1rem 1.5rem; }
 figure { margin: 0; }
+figcaption { padding-left: 3rem; max-width: 32rem; }
 figcaption, caption { font-size: 0.87rem; color: #404040; }
 svg { width: 100%; height: auto; max-width: 560px; display: block; font: 11px system-ui, sans-serif; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 0.15rem 1.2rem; margin: 0.5rem 0; }
@@ -38,7 +39,8 @@ pre { font: 0.8rem/1.4 ui-monospace, monospace; background: #f6f6f4; border: 1px
   @page { margin: 15mm; }
   body { font-size: 10pt; max-width: none; padding: 0; }
   .slider, [data-frame]:not(.last) { display: none; }
-  .figures { grid-template-columns: 1fr 1fr; gap: 0.6rem 1rem; }
+  .figures { display: block; }
+  figure { display: inline-block; width: 48%; margin-right: 1%; vertical-align: top; }
   figure, tr { break-inside: avoid; }
   h2 { break-after: avoid; }
   pre, .warning { border-width: 1px 1px 1px 4px; background: none; }

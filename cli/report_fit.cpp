@@ -2,13 +2,13 @@
 #include "cli/html.hpp"
 #include "cli/progress.hpp"
 #include "cli/report_pages.hpp"
+#include "inverse/lack_of_fit.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 namespace crampfit::cli {
 
@@ -112,7 +112,7 @@ std::string checks_section(const Fit& fit) {
                         fmt::format("{:.2g}", check.p_autocorrelation)});
     return section("Is what is left noise?",
                    table("Small p: noise alone would hardly leave as much (chi-square), or as much in a row (autocorrelation).",
-                         {"Experiment", "Curve", "Points", "Chi-square", "p", "Autocorrelation", "p"}, rows));
+                         {"Experiment", "Curve", "Points", "Chi-square", "p of it", "Autocorrelation", "p of it"}, rows));
 }
 
 // ---- parameters
@@ -254,16 +254,16 @@ std::string runs_section(const Fit& fit) {
 }
 
 std::string summary(const Fit& fit) {
-    const bool fits = fit.message.find("Lack of fit") == std::string::npos;
     std::string markup;
-    if (!fits || fit.status != FitStatus::converged)
-        markup += fmt::format("<p class=\"warning\">{}: {}</p>\n", name(fit.status), escaped(fit.message));
+    if (!lack_of_fit(fit.checks).empty() || fit.status != FitStatus::converged)
+        markup += fmt::format("<p class=\"warning\">{}</p>\n", escaped(fit.message));
     else
-        markup += paragraph(fmt::format("{}: {}", name(fit.status), fit.message));
+        markup += paragraph(fit.message);
     double seconds = 0;
     for (const FitRun& run : fit.runs)
         seconds += run.seconds;
-    return markup + facts({{"Method", fit.method},
+    return markup + facts({{"Ended", name(fit.status)},
+                           {"Method", fit.method},
                            {"Misfit", fmt::format("{:.4g}, sum of squared weighted residuals; {:.3g} for each degree of freedom",
                                                   fit.misfit, fit.reduced_chi_square)},
                            {"Cost", fmt::format("{} forward runs in {} of computing, {} by the clock", fit.runs.size(),

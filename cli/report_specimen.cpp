@@ -8,9 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
 
 namespace crampfit::cli {
 
@@ -62,13 +60,13 @@ std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std
                     std::max(1, static_cast<int>(std::lround(size.x() * scale))), CV_8UC3, cv::Scalar::all(255));
     const cv::Rect whole(0, 0, picture.cols, picture.rows);
     for (std::size_t i = 0; i < points.size(); ++i) {
-        const Vec2 low = (points[i] - 0.5 * spacing_of - view.low) * scale, high = (points[i] + 0.5 * spacing_of - view.low) * scale;
-        if (!low.allFinite() || !high.allFinite())
+        if (!points[i].allFinite())
             continue;
-        const auto pixel = [](double value) { return static_cast<int>(std::clamp(std::round(value), -1e6, 1e6)); };
-        const int left = pixel(low.x()), right = std::max(left + 1, pixel(high.x()));
-        const int top = picture.rows - pixel(high.y()), bottom = std::max(top + 1, picture.rows - pixel(low.y()));
-        picture(cv::Rect(cv::Point(left, top), cv::Point(right, bottom)) & whole).setTo(cv::Scalar(colours[i]));
+        // Outward to whole pixels, and a little overlap: what is stretched shows no seams.
+        const Vec2 low = (points[i] - 0.53 * spacing_of - view.low) * scale, high = (points[i] + 0.53 * spacing_of - view.low) * scale;
+        const cv::Point corner(static_cast<int>(std::floor(low.x())), picture.rows - static_cast<int>(std::ceil(high.y())));
+        const cv::Point opposite(static_cast<int>(std::ceil(high.x())), picture.rows - static_cast<int>(std::floor(low.y())));
+        picture(cv::Rect(corner, opposite) & whole).setTo(cv::Scalar(colours[i]));
     }
     std::vector<std::uint8_t> bytes;
     cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
@@ -106,10 +104,10 @@ std::string colour_bar(const std::string& text, const std::string& low, const st
     std::string svg;
     const double width = 240.0 / static_cast<double>(colours.size());
     for (std::size_t i = 0; i < colours.size(); ++i)
-        svg += fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"10\" fill=\"{}\" />", 62 + width * static_cast<double>(i),
+        svg += fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"10\" fill=\"{}\" />", width * static_cast<double>(i),
                            width + 0.3, hexadecimal(colours[i]));
-    return fmt::format("<figcaption>{0}<svg viewBox=\"0 0 476 26\" role=\"img\" aria-label=\"{0}: {1} to {2}\">{3}"
-                       "<text x=\"62\" y=\"23\">{1}</text><text x=\"302\" y=\"23\" text-anchor=\"end\">{2}</text></svg></figcaption>\n",
+    return fmt::format("<figcaption>{0}<svg viewBox=\"0 0 440 26\" role=\"img\" aria-label=\"{0}: {1} to {2}\">{3}"
+                       "<text x=\"0\" y=\"23\">{1}</text><text x=\"240\" y=\"23\" text-anchor=\"end\">{2}</text></svg></figcaption>\n",
                        escaped(text), escaped(low), escaped(high), svg);
 }
 
@@ -274,16 +272,18 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
 
 std::string slider(const Record& record, const std::vector<std::size_t>& frames) {
     const std::size_t last = frames.size() - 1;
+    const ScaledUnit clock = unit_for({record.frames.back().time}, units::time);
     std::string markup = fmt::format("<div class=\"slider\" hidden=\"hidden\"><label>Frame <input id=\"frame\" type=\"range\" min=\"0\" "
                                      "max=\"{0}\" value=\"{0}\" autocomplete=\"off\" /></label></div>\n",
                                      last);
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const Frame& frame = record.frames[frames[i]];
-        std::string text = fmt::format("Frame {} of {}: {:.4g} ms, displacement {:.4g} mm", frames[i] + 1, record.frames.size(),
-                                       1e3 * frame.time, 1e3 * frame.displacement);
+        std::string text = fmt::format("Frame {} of {}: {:.4g} {}, displacement {:.4g} mm", frames[i] + 1, record.frames.size(),
+                                       frame.time / clock.factor, clock.symbol, 1e3 * frame.displacement);
         if (!record.series.empty()) {
             const Instant& instant = instant_of(record, frame);
-            text += fmt::format(", force {:.4g} N, crack {:.4g} mm", instant.force, 1e3 * instant.crack_length);
+            const double force = std::round(1e3 * instant.force) / 1e3 + 0.0;  // no -0.000
+            text += fmt::format(", force {:.3f} N, crack {:.3f} mm", force, 1e3 * instant.crack_length);
         }
         markup += fmt::format("<p data-frame=\"{}\"{}>{}</p>\n", i, i == last ? " class=\"shown last\"" : "", escaped(text));
     }
