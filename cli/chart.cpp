@@ -11,10 +11,10 @@ namespace crampfit::cli {
 
 namespace {
 
-constexpr double plot_width = 400, plot_height = 250;      // of the axes [px]
+constexpr double plot_width = 400, plot_height = 250;  // of the axes [px]
 constexpr double margin_left = 62, margin_right = 14, margin_bottom = 42, legend_line = 16, title_height = 20;  // [px]
-constexpr double character_width = 6.2;                    // of the legend, on average [px]
-constexpr std::size_t most_vertices = 1200;                // of a line
+constexpr double character_width = 6.2;      // of the legend, on average [px]
+constexpr std::size_t most_vertices = 1200;  // of a line
 
 /// One axis: numbers to pixels.
 struct Axis {
@@ -111,9 +111,12 @@ class Drawing {
         draw_axes();
         for (const ChartSeries& series : chart_.series)
             draw_series(series);
-        return fmt::format("<figure>\n<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n{}{}</svg>\n{}</figure>\n",
-                           width_, height_, escaped(chart_.title + ": " + chart_.y_label + " against " + chart_.x_label), heading(),
-                           svg_, chart_.caption.empty() ? "" : "<figcaption>" + escaped(chart_.caption) + "</figcaption>\n");
+        const std::string caption =
+            chart_.caption.empty() ? "" : fmt::format("<figcaption>{}</figcaption>\n", escaped(chart_.caption));
+        return fmt::format(
+            "<figure>\n<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n{}{}</svg>\n{}{}</figure>\n", width_,
+            height_, escaped(chart_.title + ": " + chart_.y_label + " against " + chart_.x_label), heading(), svg_, caption,
+            chart_.legend_markup);
     }
 
   private:
@@ -163,8 +166,8 @@ class Drawing {
     }
 
     std::string heading() const {
-        std::string text =
-            fmt::format("<text x=\"{}\" y=\"14\" font-weight=\"600\" font-size=\"12\">{}</text>\n", margin_left, escaped(chart_.title));
+        std::string text = fmt::format("<text x=\"{}\" y=\"14\" font-weight=\"600\" font-size=\"12\">{}</text>\n", margin_left,
+                                       escaped(chart_.title));
         for (const LegendEntry& entry : legend_) {
             const ChartSeries& series = *entry.series;
             text += series.kind == ChartSeries::Kind::points
@@ -185,16 +188,17 @@ class Drawing {
     std::string framed(int frame, const std::string& markup) const {
         if (frame == always)
             return markup;
-        return fmt::format("<g data-frame=\"{}\"{}>{}</g>\n", frame, frame == chart_.last_frame ? " class=\"shown last\"" : "", markup);
+        return fmt::format("<g data-frame=\"{}\"{}>{}</g>\n", frame, frame == chart_.last_frame ? " class=\"shown last\"" : "",
+                           markup);
     }
 
     void draw_pictures() {
         for (const ChartPicture& picture : chart_.pictures) {
             const double left = x_.at(picture.left), top = y_.at(picture.top);
-            svg_ += framed(picture.frame, fmt::format("<image href=\"{}\" x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
-                                                      "preserveAspectRatio=\"none\" />\n",
-                                                      picture.address, left, top, x_.at(picture.right) - left,
-                                                      y_.at(picture.bottom) - top));
+            svg_ += framed(picture.frame,
+                           fmt::format("<image href=\"{}\" x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
+                                       "preserveAspectRatio=\"none\" />\n",
+                                       picture.address, left, top, x_.at(picture.right) - left, y_.at(picture.bottom) - top));
         }
     }
 
@@ -221,7 +225,8 @@ class Drawing {
                 line(x_.at(level), y_.from, x_.at(level), y_.to, colour::gray, " stroke-dasharray=\"4 3\"");
         for (const double level : chart_.y_levels)
             line(x_.from, y_.at(level), x_.to, y_.at(level), colour::gray, " stroke-dasharray=\"4 3\"");
-        svg_ += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\" fill=\"none\" stroke=\"#555\" />\n", x_.from, y_.to, y_.from, x_.to);
+        svg_ += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\" fill=\"none\" stroke=\"#555\" />\n", x_.from, y_.to,
+                            y_.from, x_.to);
         svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", 0.5 * (x_.from + x_.to),
                             y_.from + 34, escaped(chart_.x_label));
         svg_ += fmt::format("<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
@@ -253,8 +258,10 @@ class Drawing {
         for (std::size_t begin = 0; begin < series.x.size(); begin += stretch) {
             const std::size_t end = std::min(begin + stretch, series.x.size());
             const auto first = series.y.begin();
-            const auto [low, high] = std::minmax_element(first + static_cast<std::ptrdiff_t>(begin), first + static_cast<std::ptrdiff_t>(end));
-            std::vector<std::size_t> kept{begin, static_cast<std::size_t>(low - first), static_cast<std::size_t>(high - first), end - 1};
+            const auto [low, high] =
+                std::minmax_element(first + static_cast<std::ptrdiff_t>(begin), first + static_cast<std::ptrdiff_t>(end));
+            std::vector<std::size_t> kept{begin, static_cast<std::size_t>(low - first), static_cast<std::size_t>(high - first),
+                                          end - 1};
             std::ranges::sort(kept);
             kept.erase(std::ranges::unique(kept).begin(), kept.end());
             all.insert(all.end(), kept.begin(), kept.end());
@@ -271,8 +278,8 @@ class Drawing {
             pen_down = can_draw(series, i);
         }
         const auto stroke = [&](const char* ink, double wide) {
-            return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{} />\n", path,
-                               ink, wide, dashes(series));
+            return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"{} />\n",
+                               path, ink, wide, dashes(series));
         };
         // Over a picture a line needs a rim to be seen.
         svg_ += framed(series.frame, (chart_.pictures.empty() ? "" : stroke("#fff", 4)) + stroke(series.colour, 1.6));
@@ -285,13 +292,18 @@ class Drawing {
                 continue;
             const double x = x_.at(series.x[i]), y = y_.at(series.y[i]);
             if (!series.x_error.empty())
-                markup += fmt::format("<path d=\"M{:.1f} {:.1f}H{:.1f}\" stroke=\"{}\" stroke-width=\"0.7\" />",
-                                      x_.at(series.x[i] - series.x_error[i]), y, x_.at(series.x[i] + series.x_error[i]), series.colour);
+                markup +=
+                    fmt::format("<path d=\"M{:.1f} {:.1f}H{:.1f}\" stroke=\"{}\" stroke-width=\"0.7\" />",
+                                x_.at(series.x[i] - series.x_error[i]), y, x_.at(series.x[i] + series.x_error[i]), series.colour);
             if (!series.y_error.empty())
-                markup += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}\" stroke=\"{}\" stroke-width=\"0.7\" />", x,
-                                      y_.at(series.y[i] - series.y_error[i]), y_.at(series.y[i] + series.y_error[i]), series.colour);
+                markup +=
+                    fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}\" stroke=\"{}\" stroke-width=\"0.7\" />", x,
+                                y_.at(series.y[i] - series.y_error[i]), y_.at(series.y[i] + series.y_error[i]), series.colour);
             markup += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\" />\n", x, y,
-                                  series.frame != always ? 4.5 : series.x.size() > 300 ? 1.3 : 2.3, series.colour);
+                                  series.frame != always  ? 4.5
+                                  : series.x.size() > 300 ? 1.3
+                                                          : 2.3,
+                                  series.colour);
         }
         svg_ += framed(series.frame, markup);
     }
@@ -303,8 +315,9 @@ class Drawing {
         const double half = 0.5 * (series.x[1] - series.x[0]);
         for (std::size_t i = 0; i < series.x.size(); ++i)
             if (can_draw(series, i) && series.y[i] != 0)
-                svg_ += fmt::format("<path d=\"M{0:.1f} {2:.1f}V{3:.1f}H{1:.1f}V{2:.1f}z\" fill=\"{4}\" fill-opacity=\"0.6\" />\n",
-                                    x_.at(series.x[i] - half), x_.at(series.x[i] + half), y_.at(0), y_.at(series.y[i]), series.colour);
+                svg_ += fmt::format(
+                    "<path d=\"M{0:.1f} {2:.1f}V{3:.1f}H{1:.1f}V{2:.1f}z\" fill=\"{4}\" fill-opacity=\"0.6\" />\n",
+                    x_.at(series.x[i] - half), x_.at(series.x[i] + half), y_.at(0), y_.at(series.y[i]), series.colour);
     }
 
     struct LegendEntry {

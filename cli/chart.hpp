@@ -23,7 +23,7 @@ inline constexpr int always = -1;
 /// Pairs of numbers, drawn one way. What is not finite is left out, and breaks a line.
 struct ChartSeries {
     enum class Kind { line, dashed, points, bars };
-    std::string label{};               // in the legend; empty: not there
+    std::string label{};  // in the legend; empty: not there
     const char* colour = colour::black;
     Kind kind = Kind::line;
     std::vector<double> x{}, y{};
@@ -48,6 +48,7 @@ struct Chart {
     bool log_y = false;
     bool equal_scales = false;  // a length along x is as long along y
     int last_frame = always;
+    std::string legend_markup{};  // below it
 };
 
 /// A <figure> with the chart; empty when no series has anything to draw and there is no picture.

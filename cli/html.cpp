@@ -11,7 +11,8 @@ namespace {
 
 const char* const style = R"(
 :root { color-scheme: light; }
-body { font: 15px/1.45 system-ui, sans-serif; color: #1b1b1b; background: #fff; max-width: 1080px; margin: 0 auto; padding: 1rem 1.5rem; }
+body { font: 15px/1.45 system-ui, sans-serif; color: #1b1b1b; background: #fff;
+       max-width: 1080px; margin: 0 auto; padding: 1rem 1.5rem; }
 h1 { font-size: 1.5rem; line-height: 1.2; margin: 0.5rem 0; overflow-wrap: anywhere; }
 h2 { font-size: 1.1rem; border-bottom: 1px solid #d0d0d0; padding-bottom: 0.2rem; margin: 2rem 0 0.7rem; }
 .kind { color: #595959; margin: 0; }
@@ -31,7 +32,8 @@ caption { text-align: left; padding-bottom: 0.3rem; }
 th, td { text-align: left; padding: 0.2rem 0.7rem; border-bottom: 1px solid #e4e4e4; }
 th { border-bottom-color: #808080; }
 td.number { text-align: right; }
-pre { font: 0.8rem/1.4 ui-monospace, monospace; background: #f6f6f4; border: 1px solid #e4e4e4; padding: 0.7rem; white-space: pre-wrap; overflow-wrap: anywhere; }
+pre { font: 0.8rem/1.4 ui-monospace, monospace; background: #f6f6f4; border: 1px solid #e4e4e4; padding: 0.7rem;
+      white-space: pre-wrap; overflow-wrap: anywhere; }
 .slider label { display: flex; gap: 0.8rem; align-items: center; max-width: 560px; }
 .slider input { flex: 1; }
 @media screen { [data-frame]:not(.shown) { display: none; } }
@@ -42,6 +44,9 @@ pre { font: 0.8rem/1.4 ui-monospace, monospace; background: #f6f6f4; border: 1px
   .figures { display: block; }
   figure { display: inline-block; width: 48%; margin-right: 1%; vertical-align: top; }
   figure, tr { break-inside: avoid; }
+  .scroll { overflow: visible; }
+  table { font-size: 8pt; }
+  th, td { padding: 0.15rem 0.4rem; overflow-wrap: anywhere; print-color-adjust: exact; }
   h2 { break-after: avoid; }
   pre, .warning { border-width: 1px 1px 1px 4px; background: none; }
 }
@@ -96,13 +101,26 @@ std::string escaped(const std::string& text) {
     for (std::size_t i = 0; i < text.size();) {
         const std::size_t length = character_length(std::string_view(text).substr(i));
         switch (length == 0 ? '\0' : text[i]) {
-        case '\0': result += "\uFFFD"; break;
-        case '&': result += "&amp;"; break;
-        case '<': result += "&lt;"; break;
-        case '>': result += "&gt;"; break;
-        case '"': result += "&quot;"; break;
-        case '\'': result += "&#39;"; break;
-        default: result.append(text, i, length);
+        case '\0':
+            result += "\uFFFD";
+            break;
+        case '&':
+            result += "&amp;";
+            break;
+        case '<':
+            result += "&lt;";
+            break;
+        case '>':
+            result += "&gt;";
+            break;
+        case '"':
+            result += "&quot;";
+            break;
+        case '\'':
+            result += "&#39;";
+            break;
+        default:
+            result.append(text, i, length);
         }
         i += std::max<std::size_t>(1, length);
     }

@@ -5,7 +5,8 @@
 #include <utility>
 #include <vector>
 
-/// Pieces of a page in HTML that an XML parser reads as well. Functions that take "text" escape it; those that take "markup" do not.
+/// Pieces of a page in HTML that an XML parser reads as well. Functions that take "text" escape it; those that take "markup" do
+/// not.
 namespace crampfit::cli {
 
 /// Text as it may stand in an element or an attribute: what means something to HTML is escaped, bytes that are no UTF-8 and

@@ -58,7 +58,8 @@ std::vector<double> column(const Comparison& comparison, double FitResidual::*me
 std::string comparison_figure(const Comparison& comparison) {
     const bool arrival = comparison.kind == "arrival";
     const ScaledUnit millimetre{1e-3, "mm"};
-    const std::vector<double> measured = column(comparison, &FitResidual::measured), modelled = column(comparison, &FitResidual::modelled);
+    const std::vector<double> measured = column(comparison, &FitResidual::measured),
+                              modelled = column(comparison, &FitResidual::modelled);
     const ScaledUnit unit = arrival ? millimetre : unit_for(measured, units::force);
     const std::vector<double> at = scaled(column(comparison, &FitResidual::at), millimetre);
     const std::vector<double> sigma = comparison.rows.size() <= most_bars_of_error
@@ -81,11 +82,12 @@ std::string comparison_figure(const Comparison& comparison) {
 std::string residuals_figure(const Comparison& comparison) {
     const bool arrival = comparison.kind == "arrival";
     const std::vector<double> at = scaled(column(comparison, &FitResidual::at), {1e-3, "mm"});
-    return draw({.title = fmt::format("{}: residuals of {}", comparison.experiment, comparison.kind),
-                 .x_label = arrival ? "Crack length [mm]" : "Displacement [mm]",
-                 .y_label = "(fitted − measured) / sigma [–]",
-                 .series = {{.colour = colour::blue, .kind = Kind::points, .x = at, .y = column(comparison, &FitResidual::residual)}},
-                 .y_levels = {-2, 0, 2}});
+    return draw(
+        {.title = fmt::format("{}: residuals of {}", comparison.experiment, comparison.kind),
+         .x_label = arrival ? "Crack length [mm]" : "Displacement [mm]",
+         .y_label = "(fitted − measured) / sigma [–]",
+         .series = {{.colour = colour::blue, .kind = Kind::points, .x = at, .y = column(comparison, &FitResidual::residual)}},
+         .y_levels = {-2, 0, 2}});
 }
 
 std::string comparisons_section(const Fit& fit) {
@@ -96,10 +98,11 @@ std::string comparisons_section(const Fit& fit) {
     }
     if (drawings.empty())
         return {};
-    return section("Data against model",
-                   paragraph("At the best parameters. Of residuals that are noise, 95 of 100 lie between the outer dashed lines. Data "
-                             "without a displacement are compared by time: read ms in place of mm of displacement.") +
-                       figures(drawings));
+    return section(
+        "Data against model",
+        paragraph("At the best parameters. Of residuals that are noise, 95 of 100 lie between the outer dashed lines. Data "
+                  "without a displacement are compared by time: read ms in place of mm of displacement.") +
+            figures(drawings));
 }
 
 std::string checks_section(const Fit& fit) {
@@ -122,11 +125,12 @@ std::string parameters_section(const Fit& fit) {
     for (const FittedParameter& parameter : fit.parameters)
         rows.push_back({parameter.name, fmt::format("{:.5g}", parameter.value), parameter.unit,
                         fmt::format("{:.3g}", parameter.standard_error),
-                        fmt::format("{:.4g} to {:.4g}", parameter.lower_95, parameter.upper_95), fmt::format("{:.4g}", parameter.initial),
-                        parameter.at_bound ? "yes" : "no", parameter.key});
+                        fmt::format("{:.4g} to {:.4g}", parameter.lower_95, parameter.upper_95),
+                        fmt::format("{:.4g}", parameter.initial), parameter.at_bound ? "yes" : "no", parameter.key});
     return section("Parameters",
                    table("Best values with their 95 % intervals",
-                         {"Parameter", "Value", "Unit", "Standard error", "95 % interval", "Initial", "At a bound", "Key"}, rows));
+                         {"Parameter", "Value", "Unit", "Standard error", "95 % interval", "Initial", "At a bound", "Key"},
+                         rows));
 }
 
 std::string profiles_section(const Fit& fit) {
@@ -142,13 +146,17 @@ std::string profiles_section(const Fit& fit) {
             continue;
         ChartSeries points = series;
         points.kind = Kind::points;
-        drawings.push_back(draw({.title = "Profile of " + parameter.name, .x_label = with_unit(parameter.name, parameter.unit),
-                                 .y_label = "Rise of the misfit [–]", .series = {series, points},
+        drawings.push_back(draw({.title = "Profile of " + parameter.name,
+                                 .x_label = with_unit(parameter.name, parameter.unit),
+                                 .y_label = "Rise of the misfit [–]",
+                                 .series = {series, points},
                                  .x_levels = {parameter.lower_95, parameter.value, parameter.upper_95}}));
     }
-    return drawings.empty() ? "" : section("Profile likelihood", paragraph("The least misfit with one parameter held. Dashed: best value "
-                                                                          "and 95 % interval.") +
-                                                                 figures(drawings));
+    return drawings.empty()
+               ? ""
+               : section("Profile likelihood", paragraph("The least misfit with one parameter held. Dashed: best value "
+                                                         "and 95 % interval.") +
+                                                   figures(drawings));
 }
 
 std::vector<double> samples_of(const Fit& fit, std::size_t parameter) {
@@ -169,8 +177,11 @@ std::string histogram(const FittedParameter& parameter, const std::vector<double
         series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
     for (const double value : values)
         ++series.y[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))];
-    return draw({.title = "Posterior of " + parameter.name, .x_label = with_unit(parameter.name, parameter.unit), .y_label = "Samples [–]",
-                 .series = {series}, .x_levels = {parameter.lower_95, parameter.value, parameter.upper_95}});
+    return draw({.title = "Posterior of " + parameter.name,
+                 .x_label = with_unit(parameter.name, parameter.unit),
+                 .y_label = "Samples [–]",
+                 .series = {series},
+                 .x_levels = {parameter.lower_95, parameter.value, parameter.upper_95}});
 }
 
 std::string posterior_section(const Fit& fit) {
@@ -190,8 +201,10 @@ std::string posterior_section(const Fit& fit) {
                 cloud.y.push_back(samples[j][k]);
             }
             const FittedParameter &a = fit.parameters[i], &b = fit.parameters[j];
-            drawings.push_back(draw({.title = fmt::format("{} and {}", a.name, b.name), .x_label = with_unit(a.name, a.unit),
-                                     .y_label = with_unit(b.name, b.unit), .series = {cloud}}));
+            drawings.push_back(draw({.title = fmt::format("{} and {}", a.name, b.name),
+                                     .x_label = with_unit(a.name, a.unit),
+                                     .y_label = with_unit(b.name, b.unit),
+                                     .series = {cloud}}));
         }
     return section("Posterior", paragraph(fmt::format("{} samples. Dashed: best value and 95 % interval of the table above.",
                                                       fit.posterior.size())) +
@@ -210,15 +223,16 @@ std::string correlation_colour(double value) {
 std::string correlation_section(const Fit& fit) {
     if (fit.correlation.size() == 0)
         return section("Correlation", paragraph("There is no estimate of the covariance."));
-    std::string markup = "<div class=\"scroll\"><table>\n<caption>Near 1 or −1: the data hardly tell the two apart</caption>\n<thead><tr><td></td>";
+    std::string markup = "<div class=\"scroll\"><table>\n<caption>Near 1 or −1: the data hardly tell the two "
+                         "apart</caption>\n<thead><tr><td></td>";
     for (const FittedParameter& parameter : fit.parameters)
         markup += fmt::format("<th scope=\"col\">{}</th>", escaped(parameter.name));
     markup += "</tr></thead>\n<tbody>\n";
     for (Eigen::Index i = 0; i < fit.correlation.rows(); ++i) {
         markup += fmt::format("<tr><th scope=\"row\">{}</th>", escaped(fit.parameters[static_cast<std::size_t>(i)].name));
         for (Eigen::Index j = 0; j < fit.correlation.cols(); ++j)
-            markup += fmt::format("<td class=\"number\" style=\"background:{}\">{:.2f}</td>", correlation_colour(fit.correlation(i, j)),
-                                  fit.correlation(i, j));
+            markup += fmt::format("<td class=\"number\" style=\"background:{}\">{:.2f}</td>",
+                                  correlation_colour(fit.correlation(i, j)), fit.correlation(i, j));
         markup += "</tr>\n";
     }
     return section("Correlation", markup + "</tbody></table></div>\n");
@@ -247,8 +261,11 @@ std::string runs_section(const Fit& fit) {
     std::vector<std::vector<std::string>> rows;
     for (const auto& [status, count] : ends)
         rows.push_back({status, std::to_string(count)});
-    return section("Runs", figures({draw({.title = "Misfit of each forward run", .x_label = "Forward run [–]", .y_label = "Misfit [–]",
-                                          .caption = "Runs that failed have no misfit and are not drawn.", .series = {runs, best},
+    return section("Runs", figures({draw({.title = "Misfit of each forward run",
+                                          .x_label = "Forward run [–]",
+                                          .y_label = "Misfit [–]",
+                                          .caption = "Runs that failed have no misfit and are not drawn.",
+                                          .series = {runs, best},
                                           .log_y = true}),
                                     table("How the runs ended", {"Status", "Runs"}, rows)}));
 }

@@ -20,16 +20,18 @@ std::string title_of(const std::string& toml, const Origin& origin) {
 }
 
 std::string heading(const std::string& title, const std::string& kind, const Origin& origin) {
-    return fmt::format("<header>\n<p class=\"kind\">{} &#183; {} &#183; crampfit {} &#183; {}</p>\n<h1>{}</h1>\n</header>\n", kind,
-                       escaped(origin.file.filename().string()), escaped(origin.version), escaped(origin.created), escaped(title));
+    return fmt::format("<header>\n<p class=\"kind\">{} &#183; {} &#183; crampfit {} &#183; {}</p>\n<h1>{}</h1>\n</header>\n",
+                       kind, escaped(origin.file.filename().string()), escaped(origin.version), escaped(origin.created),
+                       escaped(title));
 }
 
 std::string repeat_section(const std::string& toml, const std::string& verb, const std::string& input, const Origin& origin) {
-    return section("How to repeat it",
-                   paragraph(fmt::format("Save the text below as {}, with the files that it names beside it; values that --set changed "
-                                         "are in it. The result was written by crampfit {}.",
-                                         input, origin.version)) +
-                       verbatim(fmt::format("crampfit {} {} -o {}", verb, input, origin.file.filename().string())) + verbatim(toml));
+    return section(
+        "How to repeat it",
+        paragraph(fmt::format("Save the text below as {}, with the files that it names beside it; values that --set changed "
+                              "are in it. The result was written by crampfit {}.",
+                              input, origin.version)) +
+            verbatim(fmt::format("crampfit {} {} -o {}", verb, input, origin.file.filename().string())) + verbatim(toml));
 }
 
 }  // namespace crampfit::cli

@@ -61,12 +61,16 @@ struct Quantity {
 };
 
 /// A marker on the curve of `first` for each frame of the slider.
-void add_frame_marks(Chart& chart, const Record& record, const Abscissa& abscissa, double Instant::*member, const ScaledUnit& unit) {
+void add_frame_marks(Chart& chart, const Record& record, const Abscissa& abscissa, double Instant::*member,
+                     const ScaledUnit& unit) {
     const std::vector<std::size_t> frames = shown_frames(record);
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const Instant& instant = instant_of(record, record.frames[frames[i]]);
-        chart.series.push_back({.colour = colour::vermillion, .kind = Kind::points, .x = {instant.*abscissa.member / abscissa.unit.factor},
-                                .y = {instant.*member / unit.factor}, .frame = static_cast<int>(i)});
+        chart.series.push_back({.colour = colour::vermillion,
+                                .kind = Kind::points,
+                                .x = {instant.*abscissa.member / abscissa.unit.factor},
+                                .y = {instant.*member / unit.factor},
+                                .frame = static_cast<int>(i)});
         chart.last_frame = static_cast<int>(i);
     }
 }
@@ -79,20 +83,26 @@ Chart chart_of(const Record& record, const Abscissa& abscissa, const std::string
     const ScaledUnit unit = unit_for(all, choices);
     Chart chart{.title = title, .x_label = abscissa.label, .y_label = fmt::format("{} [{}]", title, unit.symbol)};
     for (const Quantity& quantity : quantities)
-        chart.series.push_back({.label = quantities.size() > 1 ? quantity.label : "", .colour = quantity.colour, .kind = quantity.kind,
-                                .x = abscissa.values, .y = scaled(column(record, quantity.member), unit)});
+        chart.series.push_back({.label = quantities.size() > 1 ? quantity.label : "",
+                                .colour = quantity.colour,
+                                .kind = quantity.kind,
+                                .x = abscissa.values,
+                                .y = scaled(column(record, quantity.member), unit)});
     if (quantities.size() == 1)
         add_frame_marks(chart, record, abscissa, quantities.front().member, unit);
     return chart;
 }
 
 /// Lines of the further cracks beside the tracked one's.
-void add_cracks(Chart& chart, const Record& record, const Abscissa& abscissa, std::vector<double> CrackHistory::*member, double factor) {
+void add_cracks(Chart& chart, const Record& record, const Abscissa& abscissa, std::vector<double> CrackHistory::*member,
+                double factor) {
     const char* const inks[] = {colour::blue, colour::green, colour::orange, colour::purple};
     if (!record.cracks.empty())
         chart.series.front().label = "tracked crack";
     for (std::size_t i = 0; i < record.cracks.size(); ++i)
-        chart.series.push_back({.label = fmt::format("crack{}", i + 1), .colour = inks[i % std::size(inks)], .x = abscissa.values,
+        chart.series.push_back({.label = fmt::format("crack{}", i + 1),
+                                .colour = inks[i % std::size(inks)],
+                                .x = abscissa.values,
                                 .y = scaled(record.cracks[i].*member, {factor, ""})});
 }
 
@@ -102,7 +112,8 @@ std::vector<std::string> curves(const Record& record, const Abscissa& abscissa) 
     add_cracks(length, record, abscissa, &CrackHistory::length, 1e-3);
     Chart rate = chart_of(record, abscissa, "Energy release rate G", toughness_unit, {{"", colour::black, &Instant::G}});
     add_cracks(rate, record, abscissa, &CrackHistory::G, 1);
-    return {draw(chart_of(record, abscissa, "Force", units::force, {{"", colour::black, &Instant::force}})), draw(length), draw(rate),
+    return {draw(chart_of(record, abscissa, "Force", units::force, {{"", colour::black, &Instant::force}})), draw(length),
+            draw(rate),
             draw(chart_of(record, abscissa, "Stress intensity factors", units::stress_intensity,
                           {{"K_I, opening", colour::blue, &Instant::K_I}, {"K_II, sliding", colour::orange, &Instant::K_II}})),
             draw(chart_of(record, abscissa, "Energies", units::energy,
@@ -124,10 +135,14 @@ std::vector<std::string> driving_figures(const Record& record) {
         toughness.push_back(load.toughness);
     }
     const std::string along = "Crack length [mm]";
-    return {draw({.title = "Displacement at which the crack moves on", .x_label = along, .y_label = "Displacement [mm]",
+    return {draw({.title = "Displacement at which the crack moves on",
+                  .x_label = along,
+                  .y_label = "Displacement [mm]",
                   .caption = "Where the line falls, the crack jumps under rising displacement.",
                   .series = {{.x = length, .y = displacement}}}),
-            draw({.title = "Energy release rate and toughness along the way", .x_label = along, .y_label = "G, toughness [J/m²]",
+            draw({.title = "Energy release rate and toughness along the way",
+                  .x_label = along,
+                  .y_label = "G, toughness [J/m²]",
                   .caption = "G at the tip when the crack moves on, and the toughness over its next advance.",
                   .series = {{.label = "G at the tip", .colour = colour::blue, .x = length, .y = G},
                              {.label = "toughness", .colour = colour::vermillion, .x = length, .y = toughness}}})};
@@ -154,13 +169,14 @@ std::string curves_section(const Record& record) {
 std::string summary(const Record& record) {
     std::vector<std::pair<std::string, std::string>> rows{{"Ended", fmt::format("{}: {}", name(record.status), record.message)}};
     if (!record.series.empty()) {
-        const auto peak = std::ranges::max_element(record.series, {}, [](const Instant& instant) { return std::abs(instant.force); });
+        const auto peak =
+            std::ranges::max_element(record.series, {}, [](const Instant& instant) { return std::abs(instant.force); });
         rows.push_back({"Largest force", fmt::format("{:.4g} N at {:.4g} mm", peak->force, 1e3 * peak->displacement)});
         rows.push_back({"Crack length", fmt::format("from {:.4g} mm to {:.4g} mm", 1e3 * record.series.front().crack_length,
                                                     1e3 * record.series.back().crack_length)});
-        rows.push_back({"Work of the loading", fmt::format("{:.4g} mJ, of which {:.4g} mJ went into new crack faces",
-                                                           1e3 * record.series.back().external_work,
-                                                           1e3 * record.series.back().fracture_energy)});
+        rows.push_back({"Work of the loading",
+                        fmt::format("{:.4g} mJ, of which {:.4g} mJ went into new crack faces",
+                                    1e3 * record.series.back().external_work, 1e3 * record.series.back().fracture_energy)});
     }
     rows.push_back({"Energy balance", fmt::format("work and energies differ by at most {:.2g} % of the largest",
                                                   100 * record.worst_energy_imbalance)});

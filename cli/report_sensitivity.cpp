@@ -31,8 +31,9 @@ std::string indices_section(const Sensitivity& sensitivity) {
                 high = std::max(high, value);
             }
     }
-    std::string markup = "<div class=\"scroll\"><table>\n<caption>Indices with their 95 % intervals; bars of one output and kind share a "
-                         "scale, the thin line is 0</caption>\n<thead><tr>";
+    std::string markup =
+        "<div class=\"scroll\"><table>\n<caption>Indices with their 95 % intervals; bars of one output and kind share a "
+        "scale, the thin line is 0</caption>\n<thead><tr>";
     for (const char* head : {"Output", "Parameter", "Kind", "Value", "95 % interval", ""})
         markup += fmt::format("<th scope=\"col\">{}</th>", head);
     markup += "</tr></thead>\n<tbody>\n";
@@ -41,13 +42,14 @@ std::string indices_section(const Sensitivity& sensitivity) {
         const auto at = [low = low, high = high](double value) {
             return high > low && std::isfinite(value) ? 5 + 130 * (value - low) / (high - low) : 5;
         };
-        markup += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to {:.4g}</td>",
-                              escaped(index.output), escaped(index.parameter), escaped(index.kind), index.value, index.lower_95,
-                              index.upper_95);
-        markup += fmt::format("<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" stroke=\"#777\" />"
-                              "<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" /><circle cx=\"{:.1f}\" cy=\"7\" r=\"4\" "
-                              "fill=\"{}\" /></svg></td></tr>\n",
-                              at(0), at(index.lower_95), at(index.upper_95), colour::blue, at(index.value), colour::blue);
+        markup += fmt::format(
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to {:.4g}</td>",
+            escaped(index.output), escaped(index.parameter), escaped(index.kind), index.value, index.lower_95, index.upper_95);
+        markup += fmt::format(
+            "<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" stroke=\"#777\" />"
+            "<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" /><circle cx=\"{:.1f}\" cy=\"7\" r=\"4\" "
+            "fill=\"{}\" /></svg></td></tr>\n",
+            at(0), at(index.lower_95), at(index.upper_95), colour::blue, at(index.value), colour::blue);
     }
     return section("Indices", markup + "</tbody></table></div>\n");
 }
@@ -66,7 +68,8 @@ std::string runs_section(const Sensitivity& sensitivity) {
 
 std::string sensitivity_page(const Sensitivity& sensitivity, const Origin& origin) {
     const std::string title = title_of(sensitivity.study_text, origin);
-    std::string body = heading(title, "Sensitivity", origin) + paragraph(fmt::format("{}: {}", name(sensitivity.status), sensitivity.message));
+    std::string body =
+        heading(title, "Sensitivity", origin) + paragraph(fmt::format("{}: {}", name(sensitivity.status), sensitivity.message));
     body += facts({{"Cost", fmt::format("{} forward runs in {}", sensitivity.runs.size(), duration_text(sensitivity.seconds))},
                    {"Seed", std::to_string(sensitivity.seed)}});
     body += parameters_section(sensitivity) + indices_section(sensitivity) + runs_section(sensitivity);

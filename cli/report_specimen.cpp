@@ -32,9 +32,19 @@ struct View {
         low = low.cwiseMin(point - 0.5 * size);
         high = high.cwiseMax(point + 0.5 * size);
     }
+    bool contains(const Vec2& point) const {
+        return (point - low).minCoeff() >= 0 && (high - point).minCoeff() >= 0;  // false for what is not a number
+    }
+    /// Not beyond the rectangle of `body` and its size on each side: a run that went unstable throws points far away.
+    void keep_near(const View& body) {
+        const Vec2 size = body.high - body.low;
+        low = low.cwiseMax(body.low - size);
+        high = high.cwiseMin(body.high + size);
+    }
 };
 
-/// Distance between neighbouring points along one axis [m]: the middle one, since points beside a cutout stand off the lattice.
+/// Distance between neighbouring points along one axis [m]: the middle one, since points beside a cutout stand off the lattice;
+/// 0 where no two stand in a row.
 double spacing(const std::vector<Vec2>& points, int along) {
     std::vector<std::pair<long, double>> ordered;
     for (const Vec2& point : points)
@@ -51,19 +61,29 @@ double spacing(const std::vector<Vec2>& points, int along) {
     return *middle;
 }
 
+Vec2 spacing(const std::vector<Vec2>& points) {
+    Vec2 both(spacing(points, 0), spacing(points, 1));
+    if (!(both.maxCoeff() > 0))
+        both.setConstant(1e-3);
+    return (both.array() > 0).select(both, both.maxCoeff());
+}
+
 /// A PNG with each point as a small rectangle of its colour, on white.
 std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std::vector<Colour>& colours, const Vec2& spacing_of,
                                       const View& view, int longer_side = picture_pixels) {
     const Vec2 size = view.high - view.low;
+    if (!size.allFinite())
+        return {};
     const double scale = longer_side / size.maxCoeff();  // [px/m]
     cv::Mat picture(std::max(1, static_cast<int>(std::lround(size.y() * scale))),
                     std::max(1, static_cast<int>(std::lround(size.x() * scale))), CV_8UC3, cv::Scalar::all(255));
     const cv::Rect whole(0, 0, picture.cols, picture.rows);
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (!points[i].allFinite())
+        if (!view.contains(points[i]))
             continue;
         // Outward to whole pixels, and a little overlap: what is stretched shows no seams.
-        const Vec2 low = (points[i] - 0.53 * spacing_of - view.low) * scale, high = (points[i] + 0.53 * spacing_of - view.low) * scale;
+        const Vec2 low = (points[i] - 0.53 * spacing_of - view.low) * scale,
+                   high = (points[i] + 0.53 * spacing_of - view.low) * scale;
         const cv::Point corner(static_cast<int>(std::floor(low.x())), picture.rows - static_cast<int>(std::ceil(high.y())));
         const cv::Point opposite(static_cast<int>(std::ceil(high.x())), picture.rows - static_cast<int>(std::floor(low.y())));
         picture(cv::Rect(corner, opposite) & whole).setTo(cv::Scalar(colours[i]));
@@ -100,15 +120,17 @@ std::vector<Colour> stress_scale() {
 std::string hexadecimal(const Colour& colour) { return fmt::format("#{:02X}{:02X}{:02X}", colour[2], colour[1], colour[0]); }
 
 /// A row of colours under its ends' names.
-std::string colour_bar(const std::string& text, const std::string& low, const std::string& high, const std::vector<Colour>& colours) {
+std::string colour_bar(const std::string& text, const std::string& low, const std::string& high,
+                       const std::vector<Colour>& colours) {
     std::string svg;
     const double width = 240.0 / static_cast<double>(colours.size());
     for (std::size_t i = 0; i < colours.size(); ++i)
-        svg += fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"10\" fill=\"{}\" />", width * static_cast<double>(i),
-                           width + 0.3, hexadecimal(colours[i]));
-    return fmt::format("<figcaption>{0}<svg viewBox=\"0 0 440 26\" role=\"img\" aria-label=\"{0}: {1} to {2}\">{3}"
-                       "<text x=\"0\" y=\"23\">{1}</text><text x=\"240\" y=\"23\" text-anchor=\"end\">{2}</text></svg></figcaption>\n",
-                       escaped(text), escaped(low), escaped(high), svg);
+        svg += fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"10\" fill=\"{}\" />",
+                           width * static_cast<double>(i), width + 0.3, hexadecimal(colours[i]));
+    return fmt::format(
+        "<figcaption>{0}<svg viewBox=\"0 0 440 26\" role=\"img\" aria-label=\"{0}: {1} to {2}\">{3}"
+        "<text x=\"0\" y=\"23\">{1}</text><text x=\"240\" y=\"23\" text-anchor=\"end\">{2}</text></svg></figcaption>\n",
+        escaped(text), escaped(low), escaped(high), svg);
 }
 
 // ---- the undeformed specimen
@@ -125,8 +147,12 @@ ChartSeries path_line(const std::vector<Vec2>& path, const char* ink, int frame 
 }
 
 ChartPicture picture_over(const View& view, const std::vector<std::uint8_t>& bytes, int frame = always) {
-    return {.address = png_address(bytes), .left = 1e3 * view.low.x(), .right = 1e3 * view.high.x(), .bottom = 1e3 * view.low.y(),
-            .top = 1e3 * view.high.y(), .frame = frame};
+    return {.address = png_address(bytes),
+            .left = 1e3 * view.low.x(),
+            .right = 1e3 * view.high.x(),
+            .bottom = 1e3 * view.low.y(),
+            .top = 1e3 * view.high.y(),
+            .frame = frame};
 }
 
 Chart plane_chart(const std::string& title) {
@@ -153,15 +179,13 @@ std::string map_figure(const Record& record, const std::vector<std::size_t>& fra
     for (std::size_t i = 0; i < frames.size(); ++i)
         chart.series.push_back(path_line(record.frames[frames[i]].crack, colour::vermillion, static_cast<int>(i)));
     chart.last_frame = static_cast<int>(frames.size()) - 1;
-    std::string figure = draw(chart);
     if (two_woods) {
         std::vector<Colour> wood;
         for (int i = 0; i < stress_steps; ++i)
             wood.push_back(wood_colour(static_cast<double>(i) / (stress_steps - 1)));
-        const std::string end = "</figure>\n";
-        figure.insert(figure.size() - end.size(), colour_bar("Material", "first (earlywood)", "last (latewood)", wood));
+        chart.legend_markup = colour_bar("Material", "first (earlywood)", "last (latewood)", wood);
     }
-    return figure;
+    return draw(chart);
 }
 
 // ---- the deformed specimen
@@ -214,7 +238,8 @@ std::vector<Vec2> deformed(const Record& record, const Frame& frame, double magn
     return places;
 }
 
-std::vector<Colour> stress_colours(const std::vector<double>& stresses, double low, double high, const std::vector<Colour>& scale) {
+std::vector<Colour> stress_colours(const std::vector<double>& stresses, double low, double high,
+                                   const std::vector<Colour>& scale) {
     std::vector<Colour> colours;
     for (const double stress : stresses) {
         const double part = high > low && std::isfinite(stress) ? std::clamp((stress - low) / (high - low), 0.0, 1.0) : 0.0;
@@ -238,9 +263,10 @@ std::vector<std::vector<std::uint8_t>> draw_frames(const std::vector<std::vector
 }
 
 std::string deformed_figure(const Record& record, const std::vector<std::size_t>& frames, const Vec2& spacing_of) {
-    View body, view;
+    View body;
     for (const Vec2& point : record.point_position)
         body.include(point, spacing_of);
+    View view = body;
     const double magnification = readable_magnification(record, frames, (body.high - body.low).maxCoeff());
     std::vector<std::vector<Vec2>> places;
     std::vector<std::vector<double>> stresses;
@@ -250,6 +276,7 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
         for (const Vec2& place : places.back())
             view.include(place, spacing_of);
     }
+    view.keep_near(body);
     const auto [low, high] = stress_range(stresses);
     const std::vector<Colour> scale = stress_scale();
     std::vector<std::vector<Colour>> colours;
@@ -262,20 +289,19 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
         chart.pictures.push_back(picture_over(view, pictures[i], static_cast<int>(i)));
     chart.last_frame = static_cast<int>(frames.size()) - 1;
     const ScaledUnit unit = unit_for({low, high}, units::stress);
-    std::string figure = draw(chart);
-    const std::string end = "</figure>\n";
-    return figure.insert(figure.size() - end.size(),
-                         colour_bar(fmt::format("Largest principal stress [{}], tension positive", unit.symbol),
-                                    fmt::format("{:.3g} or less", low / unit.factor), fmt::format("{:.3g} or more", high / unit.factor),
-                                    scale));
+    chart.legend_markup =
+        colour_bar(fmt::format("Largest principal stress [{}], tension positive", unit.symbol),
+                   fmt::format("{:.3g} or less", low / unit.factor), fmt::format("{:.3g} or more", high / unit.factor), scale);
+    return draw(chart);
 }
 
 std::string slider(const Record& record, const std::vector<std::size_t>& frames) {
     const std::size_t last = frames.size() - 1;
     const ScaledUnit clock = unit_for({record.frames.back().time}, units::time);
-    std::string markup = fmt::format("<div class=\"slider\" hidden=\"hidden\"><label>Frame <input id=\"frame\" type=\"range\" min=\"0\" "
-                                     "max=\"{0}\" value=\"{0}\" autocomplete=\"off\" /></label></div>\n",
-                                     last);
+    std::string markup =
+        fmt::format("<div class=\"slider\" hidden=\"hidden\"><label>Frame <input id=\"frame\" type=\"range\" min=\"0\" "
+                    "max=\"{0}\" value=\"{0}\" autocomplete=\"off\" /></label></div>\n",
+                    last);
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const Frame& frame = record.frames[frames[i]];
         std::string text = fmt::format("Frame {} of {}: {:.4g} {}, displacement {:.4g} mm", frames[i] + 1, record.frames.size(),
@@ -313,7 +339,7 @@ const Instant& instant_of(const Record& record, const Frame& frame) {
 
 std::string specimen_section(const Record& record) {
     const std::vector<std::size_t> frames = shown_frames(record);
-    const Vec2 spacing_of(spacing(record.point_position, 0), spacing(record.point_position, 1));
+    const Vec2 spacing_of = spacing(record.point_position);
     std::vector<std::string> drawings{map_figure(record, frames, spacing_of)};
     std::string markup;
     if (frames.empty())

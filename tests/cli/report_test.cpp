@@ -57,10 +57,23 @@ Fit small_fit() {
     fit.message = "Converged.";
     fit.method = "Ceres, since derivatives are exact";
     fit.study_text = "title = \"E & G of a <block>\"\n";
-    fit.parameters = {{.name = "E", .key = "materials.EW.E", .value = 40, .unit = "MPa", .standard_error = 1, .lower_95 = 38,
-                       .upper_95 = 42, .initial = 60},
-                      {.name = "toughness <EW>", .key = "materials.EW.toughness", .value = 100, .unit = "J/m^2", .standard_error = 5,
-                       .lower_95 = 90, .upper_95 = 111, .initial = 80, .at_bound = true}};
+    fit.parameters = {{.name = "E",
+                       .key = "materials.EW.E",
+                       .value = 40,
+                       .unit = "MPa",
+                       .standard_error = 1,
+                       .lower_95 = 38,
+                       .upper_95 = 42,
+                       .initial = 60},
+                      {.name = "toughness <EW>",
+                       .key = "materials.EW.toughness",
+                       .value = 100,
+                       .unit = "J/m^2",
+                       .standard_error = 5,
+                       .lower_95 = 90,
+                       .upper_95 = 111,
+                       .initial = 80,
+                       .at_bound = true}};
     fit.correlation = Eigen::MatrixXd::Identity(2, 2);
     fit.correlation(0, 1) = fit.correlation(1, 0) = -0.5;
     fit.covariance = fit.correlation;
@@ -69,7 +82,8 @@ Fit small_fit() {
         fit.residuals.push_back({"pull", "arrival", 1e-3 + 1e-4 * i, 1e-5 * i, 1e-5 * i, 1e-6, 0});
         fit.profile.push_back({"E", 38 + 0.2 * i, 5 + 0.01 * (i - 10) * (i - 10)});
         fit.posterior.push_back({{40 + 0.1 * i, 100 - 0.3 * i}, 6});
-        fit.runs.push_back({{60.0 - i, 80.0 + i}, i == 3 ? INFINITY : 100.0 / (i + 1), i == 3 ? "did not converge" : "finished", 0.1});
+        fit.runs.push_back(
+            {{60.0 - i, 80.0 + i}, i == 3 ? INFINITY : 100.0 / (i + 1), i == 3 ? "did not converge" : "finished", 0.1});
     }
     fit.checks = {{"pull", "force", 20, 0.8, 1, 0.9, 1e-5}, {"pull", "arrival", 20, 0, 1, 0, 0.5}};
     fit.misfit = 5;
@@ -86,9 +100,10 @@ TEST(SystemReport, PageOfARecordShowsAllOfItAndEscapesText) {
     const Record record = read_record(command.path("record.h5"));
     ASSERT_GE(record.frames.size(), 2u);
     const std::string page = report(command, "record.h5");
-    EXPECT_EQ(count(page, "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;more&lt;/b&gt;"), 4) << "title, head, explanation, scene";
-    for (const char* part : {"Force [", "Crack length [mm]", "Energy release rate G [J/m²]", "Stress intensity factors [", "Energies [",
-                             "[materials.EW]", "crampfit simulate scene.toml -o record.h5", "x [mm]"})
+    EXPECT_EQ(count(page, "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;more&lt;/b&gt;"), 4)
+        << "title, head, explanation, scene";
+    for (const char* part : {"Force [", "Crack length [mm]", "Energy release rate G [J/m²]", "Stress intensity factors [",
+                             "Energies [", "[materials.EW]", "crampfit simulate scene.toml -o record.h5", "x [mm]"})
         EXPECT_TRUE(contains(page, part)) << part;
     // The slider has each frame, with a sentence; the map is one picture, the deformed specimen one a frame.
     EXPECT_TRUE(contains(page, fmt::format("max=\"{}\"", record.frames.size() - 1)));
@@ -112,6 +127,12 @@ TEST(SystemReport, PageOfARecordThatHoldsNextToNothing) {
     record.series = {{.time = 0, .force = INFINITY}, {.time = 1, .force = nothing, .G = 1}};
     write(record, command.path("infinite.h5"));
     EXPECT_TRUE(contains(report(command, "infinite.h5"), "Energy release rate G [J/m²]"));
+    // One point, thrown away by a run that went unstable.
+    record.point_position = {{1e-3, 2e-3}};
+    record.point_latewood = {0};
+    record.frames = {{.time = 1, .moved = {{1e30f, INFINITY}}, .stress = {Eigen::Vector4f::Constant(INFINITY)}, .crack = {}}};
+    write(record, command.path("unstable.h5"));
+    EXPECT_EQ(count(report(command, "unstable.h5"), "<image "), 2);
 }
 
 TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
@@ -120,10 +141,12 @@ TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
     const std::string page = report(command, "fit.h5");
     EXPECT_TRUE(contains(page, "<title>E &amp; G of a &lt;block&gt;</title>"));
     EXPECT_TRUE(contains(page, "class=\"warning\""));
-    for (const char* part : {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack", "Profile of E",
-                             "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml -o fit.h5"})
+    for (const char* part :
+         {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack", "Profile of E",
+          "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml -o fit.h5"})
         EXPECT_TRUE(contains(page, part)) << part;
-    // A point for each: two curves with a legend each, their residuals, the profile, the samples, the runs that ended, their legend.
+    // A point for each: two curves with a legend each, their residuals, the profile, the samples, the runs that ended, their
+    // legend.
     EXPECT_EQ(count(page, "<circle "), 20 + 1 + 20 + 20 + 1 + 20 + 20 + 20 + 19 + 1);
     EXPECT_FALSE(contains(page, "nan") || contains(page, "inf ")) << "in a path";
 }
@@ -134,7 +157,8 @@ TEST(SystemReport, PageOfASensitivityStudy) {
     study.message = "2 of 3 runs ended well";
     study.parameters = {{"E", "materials.EW.E", "MPa", 40, 20, 80}};
     study.outputs = {{"peak force", "N"}};
-    study.indices = {{"peak force", "E", "local", 0.5, 0.4, 0.6, "elasticity"}, {"peak force", "E", "local", nothing, nothing, nothing, "derivative"}};
+    study.indices = {{"peak force", "E", "local", 0.5, 0.4, 0.6, "elasticity"},
+                     {"peak force", "E", "local", nothing, nothing, nothing, "derivative"}};
     study.runs = {{{40}, {1}, "finished", 1}, {{41}, {2}, "finished", 1}, {{42}, {nothing}, "failed <hard>", 1}};
     write(study, command.path("study.h5"));
     const std::string page = report(command, "study.h5");
@@ -197,9 +221,10 @@ TEST(SystemReport, PageRunsInABrowserWithoutAWordOnTheConsole) {
     command.folder.write("scene.toml", hostile_scene());
     ASSERT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5")}).status, 0);
     ASSERT_TRUE(contains(report(command, "record.h5"), "<div class=\"slider\" hidden=\"hidden\">"));
-    const std::string browse = "timeout 60 chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
-                               "--disable-background-networking --disable-component-update --disable-sync --enable-logging=stderr "
-                               "--v=0 --user-data-dir='{0}/profile' --dump-dom 'file://{0}/page.html' > '{0}/dom.html' 2> '{0}/log.txt'";
+    const std::string browse =
+        "timeout 60 chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
+        "--disable-background-networking --disable-component-update --disable-sync --enable-logging=stderr "
+        "--v=0 --user-data-dir='{0}/profile' --dump-dom 'file://{0}/page.html' > '{0}/dom.html' 2> '{0}/log.txt'";
     ASSERT_EQ(std::system(fmt::format(fmt::runtime(browse), command.path("")).c_str()), 0);
     EXPECT_TRUE(contains(command.folder.read("dom.html"), "<div class=\"slider\"><label>"));
     EXPECT_TRUE(contains(command.folder.read("dom.html"), "aria-valuetext=\"Frame "));
