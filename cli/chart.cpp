@@ -22,7 +22,7 @@ struct Axis {
     double from = 0, to = 1;  // [px]
     bool log = false;
 
-    bool takes(double value) const { return std::isfinite(value) && (!log || value > 0); }
+    bool takes(double value) const { return std::abs(value) < 1e150 && (!log || value > 0); }  // differences stay finite
     void include(double value) {
         if (takes(value)) {
             low = std::min(low, value);
@@ -33,7 +33,7 @@ struct Axis {
         const double part = log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
         return from + part * (to - from);
     }
-    /// Room at both ends, and a range where all values are the same.
+    /// Room at both ends, and a range where all values are the same, or so nearly that ticks could not tell them apart.
     void widen() {
         if (!(low <= high))
             low = high = log ? 1 : 0;
@@ -42,9 +42,10 @@ struct Axis {
             low /= factor;
             high *= factor;
         } else {
-            const double room = high > low ? 0.04 * (high - low) : 0.1 * std::max(std::abs(high), 1e-300);
-            low -= high > low || low != 0 ? room : 1;
-            high += high > low && high != 0 ? room : 1;
+            const double size = std::max(std::abs(low), std::abs(high));
+            const double room = high - low > 1e-4 * size ? 0.04 * (high - low) : size > 0 ? 0.1 * size : 1;
+            low -= room;
+            high += room;
         }
     }
 };

@@ -176,7 +176,8 @@ std::string histogram(const FittedParameter& parameter, const std::vector<double
     for (std::size_t i = 0; i < bins; ++i)
         series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
     for (const double value : values)
-        ++series.y[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))];
+        if (std::isfinite(value))
+            ++series.y[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))];
     return draw({.title = "Posterior of " + parameter.name,
                  .x_label = with_unit(parameter.name, parameter.unit),
                  .y_label = "Samples [–]",

@@ -2,12 +2,12 @@
 #include "cli/html.hpp"
 #include "cli/progress.hpp"
 #include "cli/report_pages.hpp"
-#include "datasets/record_file.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace crampfit::cli {
 
@@ -60,7 +60,7 @@ struct Quantity {
     Kind kind = Kind::line;
 };
 
-/// A marker on the curve of `first` for each frame of the slider.
+/// A marker on the curve of `member` for each frame of the slider.
 void add_frame_marks(Chart& chart, const Record& record, const Abscissa& abscissa, double Instant::*member,
                      const ScaledUnit& unit) {
     const std::vector<std::size_t> frames = shown_frames(record);
