@@ -22,6 +22,7 @@ Verb correlate_verb(CLI::App& command, const CommonOptions& common);
 Verb track_verb(CLI::App& command, const CommonOptions& common);
 Verb sensitivity_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
+Verb report_verb(CLI::App& command, const CommonOptions& common);
 Verb bench_verb(CLI::App& command, const CommonOptions& common);
 
 }  // namespace crampfit::cli
