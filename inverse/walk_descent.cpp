@@ -18,7 +18,7 @@ constexpr double last_radius = 0.03;
 constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
 
-constexpr int points_a_parameter = 12;  // of a spread: they average over the kinks that jumps make
+constexpr int points_a_parameter = 6;  // of a spread
 constexpr int model_descents = 2;
 constexpr int runs_across_kinks = 120;
 constexpr int most_polishing_steps = 15;

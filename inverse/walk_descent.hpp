@@ -17,8 +17,8 @@ using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 SearchResult descend_by_walks(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage);
 
-/// Step of differences where runs are free of noise, as a part of the box: wide enough to average over the kinks that jumps make.
-inline constexpr double smooth_step = 0.003;
+/// Step of differences where runs are free of noise, as a part of the box.
+inline constexpr double smooth_step = 1e-4;
 
 /// Runs a cheap model at points spread evenly about a point, within the reach of such differences.
 void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed);

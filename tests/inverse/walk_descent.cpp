@@ -1,0 +1,59 @@
+// Descent on the models that runs leave behind, against a function whose minimum is known.
+#include "inverse/walk_descent.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit {
+namespace {
+
+// Residuals of Powell's badly placed kind: exact in the first parameter, curved in the second, zero at (0.7, 0.3).
+Eigen::VectorXd residuals(const Eigen::VectorXd& x) {
+    Eigen::VectorXd r(3);
+    r << 10.0 * (x[0] - 0.7) + std::exp(3.0 * x[1]) - std::exp(0.9), 20.0 * (x[1] * x[1] - 0.09), std::sin(5.0 * (x[0] - 0.7)) * x[1];
+    return r;
+}
+
+// To first order in the second parameter about a point.
+Eigen::VectorXd residuals_near(const Eigen::VectorXd& point, const Eigen::VectorXd& x) {
+    Eigen::VectorXd base = x, more = x, less = x;
+    base[1] = point[1];
+    more[1] = point[1] + 1e-6;
+    less[1] = point[1] - 1e-6;
+    return residuals(base) + (residuals(more) - residuals(less)) / 2e-6 * (x[1] - point[1]);
+}
+
+Evaluation evaluation(const Eigen::VectorXd& r) { return {"finished", r, r, r.squaredNorm(), 0.0}; }
+
+TEST(UnitWalkDescent, FindsTheLowestPointInFewRuns) {
+    for (const auto& [first, second] : {std::pair{0.1, 0.9}, {0.9, 0.1}, {0.5, 0.6}}) {
+        Objective objective(2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 100, 1);
+        const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
+            return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
+        };
+        const SearchResult found = descend_by_walks(objective, near, Eigen::Vector2d(first, second), 1, [](const std::string&) {});
+        ASSERT_NE(objective.best(), nullptr);
+        const Eigen::VectorXd best = objective.best()->x;
+        std::printf("from (%.1f, %.1f): %zu runs, off by %.1e\n", first, second, objective.runs().size(),
+                    (best - Eigen::Vector2d(0.7, 0.3)).norm());
+        EXPECT_TRUE(found.converged);
+        EXPECT_NEAR(best[0], 0.7, 1e-6);
+        EXPECT_NEAR(best[1], 0.3, 1e-6);
+        EXPECT_LE(objective.runs().size(), 15u);
+    }
+}
+
+TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
+    Objective objective(2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 2, 1);
+    const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
+        return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
+    };
+    const SearchResult found = descend_by_walks(objective, near, Eigen::Vector2d(0.1, 0.9), 1, [](const std::string&) {});
+    EXPECT_FALSE(found.converged);
+    EXPECT_EQ(objective.runs().size(), 2u);
+}
+
+}  // namespace
+}  // namespace crampfit
