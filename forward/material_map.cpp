@@ -159,8 +159,21 @@ LocalWood MaterialMap::at(const Vec2& x) const {
     return wood;
 }
 
+// The wood of a rectangle that lies within one band of the rings; null where it may hold others.
+const LocalWood* MaterialMap::band_around(const Vec2& centre, const Vec2& half) const {
+    if (!scene_.specimen.rings || scene_.specimen.map || orthotropic_) return nullptr;
+    const Rings& rings = *scene_.specimen.rings;
+    const double turns = (centre - rings.pith).norm() / rings.period;
+    const double reach = half.norm() / rings.period;
+    const double low = turns - reach - std::floor(turns), high = turns + reach - std::floor(turns);
+    const double latewood_start = 1.0 - rings.latewood_fraction;
+    if (low > 0.0 && high < latewood_start - rings.transition / rings.period) return &pure_[0];
+    return low > latewood_start && high < 1.0 ? &pure_[1] : nullptr;
+}
+
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (homogeneous_) return pure_[0];
+    if (const LocalWood* wood = band_around(centre, half)) return *wood;
     // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
     const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
     const int samples = std::clamp(fit, 2, 16);

@@ -41,6 +41,7 @@ class MaterialMap {
     void check_transition(int first) const;
     Vec2 radial_direction(const Vec2& x) const;
     void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, LayeredElasticity& mean) const;
+    const LocalWood* band_around(const Vec2& centre, const Vec2& half) const;
     LocalWood in_rings(const Vec2& x) const;
     LocalWood in_picture(const Vec2& x) const;
 
