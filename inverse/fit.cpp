@@ -199,21 +199,35 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         for (const Parameter& parameter : study.parameters) {
             names.push_back(parameter.name);
         }
-        // Near the best point runs are cheap where the simulation has derivatives.
+        // Near the best point runs are cheap where the simulation has derivatives. Wide differences average over the kinks that jumps
+        // make; where those hide a slope, narrower ones see it.
         std::optional<Objective> close;
-        if (by_walks) {
-            close.emplace(box.size(), near(objective.best()->x), most_cheap_runs, objective.threads(), options.stop_requested);
-            spread_about(*close, objective.best()->x, options.seed);
-        }
-        Objective& around = close ? *close : objective;
-        const auto estimate = [&] { return estimate_uncertainty(around, model.curve_lengths(), names, close ? smooth_step : difference_step); };
+        const auto estimate_by_walks = [&] {
+            Uncertainty first;
+            for (const double step : {difference_step, 0.3 * difference_step, 0.1 * difference_step, 0.01 * difference_step, 0.003 * difference_step}) {
+                close.emplace(box.size(), near(objective.best()->x), most_cheap_runs, objective.threads(), options.stop_requested);
+                spread_about(*close, objective.best()->x, step, options.seed);
+                const Uncertainty here = estimate_uncertainty(*close, model.curve_lengths(), names, step);
+                const bool all_told = ((here.upper_95 - here.lower_95).array() < 1.0).all();
+                if (all_told) {
+                    return here;
+                }
+                if (step == difference_step) {
+                    first = here;
+                }
+            }
+            return first;
+        };
+        const auto estimate = [&] {
+            return by_walks ? estimate_by_walks() : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
+        };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
                 return Exploration();
             }
             const bool cheap = own ? only_toughness || by_walks : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
-            return explore(around, about, study.uncertainty, stations, cheap, options.seed, stage);
+            return explore(close ? *close : objective, about, study.uncertainty, stations, cheap, options.seed, stage);
         };
         Uncertainty uncertainty = estimate();
         Exploration exploration = look_around(uncertainty);

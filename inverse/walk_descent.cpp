@@ -18,7 +18,7 @@ constexpr double last_radius = 0.03;
 constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
 
-constexpr int points_a_parameter = 6;  // of a spread
+constexpr int points_a_parameter = 12;  // of a spread
 constexpr int model_descents = 2;
 constexpr int runs_across_kinks = 120;
 constexpr int most_polishing_steps = 15;
@@ -106,10 +106,10 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
 
 }  // namespace
 
-void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed) {
+void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed) {
     std::vector<Eigen::VectorXd> points{x};
     for (int i = 1; i <= points_a_parameter * static_cast<int>(x.size()); ++i) {
-        const Eigen::VectorXd away = 1.5 * smooth_step * (2.0 * halton(i, x.size(), seed).array() - 1.0);
+        const Eigen::VectorXd away = 1.5 * step * (2.0 * halton(i, x.size(), seed).array() - 1.0);
         points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
     }
     objective.at(points);

@@ -17,10 +17,7 @@ using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 SearchResult descend_by_walks(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage);
 
-/// Step of differences where runs are free of noise, as a part of the box.
-inline constexpr double smooth_step = 1e-4;
-
-/// Runs a cheap model at points spread evenly about a point, within the reach of such differences.
-void spread_about(Objective& objective, const Eigen::VectorXd& x, unsigned seed);
+/// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.
+void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed);
 
 }  // namespace crampfit
