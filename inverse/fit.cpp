@@ -181,7 +181,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
     const SearchResult found =
-        by_walks ? descend_by_walks(objective, near, box.initial(), options.seed, stage)
+        by_walks ? descend_by_walks(objective, near, study.optimizer.starts, box.initial(), options.seed, stage)
                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
     objective.set_budget_left(objective.budget_left() + reserve);
 

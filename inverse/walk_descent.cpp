@@ -115,33 +115,57 @@ void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, u
     objective.at(points);
 }
 
-SearchResult descend_by_walks(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed,
-                              const std::function<void(const std::string&)>& stage) {
-    stage("descent");
-    SearchResult result;
-    result.method = "auto: steps to the lowest point nearby, each confirmed by a run. Nearby, equilibria that are known serve other "
-                    "toughnesses as they are, and other moduli moved by their exact derivatives. Chosen because all parameters are such.";
-    objective.at(initial);
+namespace {
+
+// One descent; whether it ended by its own criterion.
+bool descend_from(Objective& objective, const Near& near, const Eigen::VectorXd& start, unsigned seed) {
+    objective.at(start);
     double radius = first_radius;
-    while (objective.best() && !objective.exhausted()) {
+    while (objective.best() && !objective.exhausted() && radius >= least_radius) {
         const Run here = *objective.best();
         const Objective::Evaluate model = near(here.x);
         const Run trial = lowest(model, Window(here.x, radius), here.x, objective, seed);
         const double expected = here.evaluation->misfit - trial.evaluation->misfit;
         if (!(expected > least_gain * here.evaluation->misfit)) {
-            result.converged = !objective.stopped();
-            result.method += fmt::format(" {} runs.", objective.runs().size());
-            return result;
+            return !objective.stopped();
         }
         objective.at(trial.x);
         const double gain = here.evaluation->misfit - objective.best()->evaluation->misfit;
         const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
         radius = gain < 0.25 * expected ? 0.25 * std::min(radius, step) : std::clamp(2.0 * step, last_radius, first_radius);
-        if (radius < least_radius) {
-            result.converged = true;
-            break;
+    }
+    return objective.best() != nullptr && radius < least_radius;
+}
+
+// Whether the noise explains the misfit: residuals of two sigma at most.
+bool is_explained(const Evaluation& best, Eigen::Index parameters) {
+    constexpr double explained = 4.0;
+    return best.misfit < explained * static_cast<double>(std::max<Eigen::Index>(1, best.residuals.size() - parameters));
+}
+
+}  // namespace
+
+SearchResult descend_by_walks(Objective& objective, const Near& near, int starts, const Eigen::VectorXd& initial, unsigned seed,
+                              const std::function<void(const std::string&)>& stage) {
+    stage("descent");
+    SearchResult result;
+    int descents = 0;
+    while (descents < starts && !objective.exhausted() &&
+           !(objective.best() && is_explained(*objective.best()->evaluation, initial.size()))) {
+        const double least = objective.best() ? objective.best()->evaluation->misfit : INFINITY;
+        Objective branch = objective.branch(objective.budget_left(), objective.threads());
+        const bool converged = descend_from(branch, near, descents == 0 ? initial : halton(descents, initial.size(), seed), seed);
+        objective.join(branch);
+        ++descents;
+        if (branch.best() && branch.best()->evaluation->misfit < least) {
+            result.converged = converged;
         }
     }
+    result.method = fmt::format(
+        "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other toughnesses as "
+        "they are, and other moduli moved by their exact derivatives. From the initial values, and from others, up to {}, while the "
+        "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
+        starts, descents, objective.runs().size());
     return result;
 }
 
