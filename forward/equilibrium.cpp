@@ -366,17 +366,29 @@ TipLoad Equilibrium::load_at(int crack, bool at_end) const {
     return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, still, still}, options);
 }
 
+// Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
+void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
+    int last = -1;
+    for (int p = 0; p < body_.points.count(); ++p) {
+        const int c = body_.points.cell[p];
+        if (c == last || before[p] == body_.points.node[p]) continue;
+        last = c;
+        body_.for_cells_in({body_.layout.cell_corner(c) - 0.5 * body_.layout.cell, body_.layout.cell_corner(c) + 1.5 * body_.layout.cell},
+                           [&](int near) { factor_.mark(near); });
+    }
+}
+
 Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, displacement_, time_}; }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
-    body_.points.node = snapshot.node;
+    const std::vector<std::array<int, 4>> before = std::exchange(body_.points.node, snapshot.node);
     boundary_.held = snapshot.held;
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;
     internal_force_.sort_cells();
     renumber();
-    factor_.mark_all();
+    mark_changes(before);
     find_forces();
 }
 

@@ -75,6 +75,7 @@ class Equilibrium {
 
   private:
     void renumber();
+    void mark_changes(const std::vector<std::array<int, 4>>& fields_before);
     void find_forces();
     bool factor_tangent(bool geometric);
     GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);

@@ -1,7 +1,6 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
-#include "forward/growth.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +9,6 @@
 namespace crampfit {
 
 namespace {
-
-constexpr double never = std::numeric_limits<double>::infinity();
 
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
@@ -27,9 +24,6 @@ constexpr int most_parts = 16;
 
 // Part by which the change of the potential over a loading step may differ from the load's work by its ends (trapezoid rule).
 constexpr double most_disagreement = 0.1;
-
-// G at the tip over toughness below which a crack is not about to move.
-constexpr double far_below = 0.3;
 
 Scene with_wide_cells(Scene scene) {
     scene.model.cell *= 2.0;
@@ -62,48 +56,25 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
     const double cell = body_.layout.cell.minCoeff();
-    increment_ = increment_in_cells * cell;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
-        if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.emplace_back(k, false);
-        if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.emplace_back(k, true);
-        if (crack.grows == Growth::none || crack.advance == 0.0) continue;
-        ahead_ = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
-        increment_ = crack.advance / static_cast<double>(ahead_);
+        std::size_t ahead = 0;
+        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
+        if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
+        if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
     }
-    add_place();
+    way_.push_back(add_place(-1, 0u));
     if (leader && plan.linear) know_linear(0);
 }
 
 Quasistatic::~Quasistatic() = default;
 
-// The equilibrium stands at a new place of the crack.
-void Quasistatic::add_place() {
-    Place& place = places_.emplace_back();
-    Station& station = place.station;
-    station.thickness = body_.layout.thickness;
-    station.linear = plan_.linear;
-    station.still_from = plan_.still_from;
-    station.left = true;
-    station.grows = !growing_.empty();
-    for (const CrackLine& line : equilibrium_.cracks().lines) {
-        station.tips.push_back({line.start.position, line.end.position});
-        station.lengths.push_back(line.length);
-    }
-    for (const auto& [crack, at_end] : growing_) {
-        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
-        station.left = false;
-        station.crack = crack;
-        station.at_end = at_end;
-    }
-    if (!plan_.linear) place.snapshot = equilibrium_.save();
-    entered_ = &place;
-}
+Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nullptr; }
 
-void Quasistatic::enter(const Place& place) {
-    if (entered_ == &place) return;
-    equilibrium_.restore(*place.snapshot);
-    entered_ = &place;
+bool Quasistatic::fail() {
+    failure_ = "no equilibrium was found";
+    return false;
 }
 
 LoadState Quasistatic::load_state() const {
@@ -204,7 +175,7 @@ void Quasistatic::shift(const std::vector<double>& by) {
 
 // In a linear scene no load and full load say all; the state half way is between them.
 bool Quasistatic::know_linear(std::size_t number) {
-    if (coarse_ && !coarse_->walk.reach(number, 0.0)) return false;
+    if (coarse_ && !coarse_->walk.follow_leader(number)) return false;
     const auto solve = [&](int time) {
         ++equilibria_;
         return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
@@ -325,7 +296,7 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
-    if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
+    if (coarse_ && !(coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time))) return false;
     if (time == 0 && equilibrium_.boundary().tractions.empty()) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
@@ -345,136 +316,20 @@ bool Quasistatic::find(std::size_t number, int time) {
 // Knows a place, and the one an advance further, at a time.
 bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(number, time)) return false;
-    Station& station = places_[number].station;
-    if (station.crack < 0 || station.route.size() < 2) return true;
-    const std::size_t further = std::min(number + ahead_, places_.size() - 1);
-    if (!plan_.linear && !know(further, time)) return false;
-    const LoadState& state = places_[further].station.states.at(time);
-    station.ahead[time] = {state.potential, state.power};
+    Place& place = places_[number];
+    if (place.station.moving.empty() || place.station.moving.front().route.size() < 2) return true;
+    if (!plan_.linear && !know(place.further, time)) return false;
+    const LoadState& state = places_[place.further].station.states.at(time);
+    place.station.ahead[time] = {state.potential, state.power};
     return true;
 }
 
-Vec2 Quasistatic::next_tip(const Place& last, const TipLoad& load) const {
-    const Station& station = last.station;
-    if (leader_) return leader_->places_[places_.size()].station.tips[station.crack][station.at_end];
-    const CrackTip& tip = equilibrium_.cracks().lines[station.crack].tip(station.at_end);
-    return tip.position + increment_ * growth_direction(scene_.cracks[station.crack].direction, tip, load, materials_, increment_);
-}
-
-// Grows the crack from the last place to the next one.
-bool Quasistatic::extend(double now) {
-    Place& last = places_.back();
-    Station& station = last.station;
-    if (station.left) return false;
-    int time = last_time_;
-    if (leader_) {
-        station.crack = leader_->places_[places_.size() - 1].station.crack;
-        station.at_end = leader_->places_[places_.size() - 1].station.at_end;
-        enter(last);
-    } else if (!plan_.linear) {
-        time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
-        if (!know(places_.size() - 1, time)) return false;
-        enter(last);
-        equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time));
-    }
-    const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
-    const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));
-    std::map<int, Known> guess = last.known;
-    for (auto& [time_there, known] : guess)
-        for (const auto& [added, from] : fields) known.displacement.push_back(known.displacement[from]);
-    add_place();
-    places_.back().guess = std::move(guess);
-    return !plan_.linear || know_linear(places_.size() - 1);
-}
-
-bool Quasistatic::reach(std::size_t station, double now) {
-    while (places_.size() <= station + (leader_ ? 0 : ahead_) && !places_.back().station.left) {
-        if (leader_ && places_.size() >= leader_->places_.size()) break;
-        if (extend(now)) continue;
-        failure_ = "no equilibrium was found";
-        break;
-    }
-    if (station >= places_.size()) return false;
-    find_route(station);
-    return true;
-}
-
-void Quasistatic::find_route(std::size_t number) {
-    Station& station = places_[number].station;
-    if (station.crack < 0 || leader_) return;
-    station.route = {station.tips[station.crack][station.at_end]};
-    for (std::size_t k = number + 1; k <= number + ahead_ && k < places_.size(); ++k) {
-        const Vec2& tip = places_[k].station.tips[station.crack][station.at_end];
-        if (tip != station.route.back()) station.route.push_back(tip);
-    }
-}
-
-// Of several tips the one moves that reaches its toughness first.
-void Quasistatic::choose_tip(Station& station, const MaterialMap& materials) const {
-    double first = never;
-    Station trial = station;
-    for (const auto& [crack, at_end] : growing_) {
-        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
-        trial.crack = crack;
-        trial.at_end = at_end;
-        trial.route = {station.tips[crack][at_end]};
-        const double time = trial.critical_time(mean_toughness(materials, trial.route));
-        if (time >= first) continue;
-        first = time;
-        station.crack = crack;
-        station.at_end = at_end;
-        station.route = trial.route;
-    }
-}
-
-Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now) {
-    Station& station = places_[number].station;
-    if (station.left || station.crack < 0) return {};
-    const auto judge = [&]() -> Critical {
-        if (growing_.size() > 1) choose_tip(station, materials);
-        const double toughness = mean_toughness(materials, station.route);
-        return {station.critical_time(toughness), toughness};
-    };
-    const auto fail = [&]() -> Critical {
-        failure_ = "no equilibrium was found";
-        return {};
-    };
-    if (plan_.linear) {
-        for (const int time : {0, 1, 2}) know_ahead(number, time);
-        return judge();
-    }
-    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
-    int high = low + 1;
-    // As long as G at the tip is this far below the toughness, what lies ahead is not asked for; were the next advance to release
-    // more all the same, that shows later, and what is missing is found then.
-    const auto far_from_critical = [&](int time) {
-        if (growing_.size() > 1 || !know(number, time)) return false;
-        const double toughness = mean_toughness(materials, station.route);
-        return station.states.at(time).tips[2 * station.crack + station.at_end].G < far_below * toughness;
-    };
-    while (high < last_time_ && far_from_critical(high)) low = high++;
-    while (true) {
-        if (!know_ahead(number, low) || !know_ahead(number, high)) return fail();
-        const Critical found = judge();
-        if (!std::isfinite(found.time)) {
-            if (high >= last_time_) return found;
-            low = high++;
-            continue;
-        }
-        // Good where it lies between two states that stand next to each other, or where it has been due before.
-        const int before = static_cast<int>(found.time / time_step_);
-        if (found.time <= now || before >= last_time_) return found;
-        if (station.ahead_known(before) && station.ahead_known(before + 1)) return found;
-        low = std::max(0, before);
-        high = low + 1;
-    }
-}
-
-LoadState Quasistatic::at(std::size_t number, double time) {
+LoadState Quasistatic::at(std::size_t station_number, double time) {
+    const int number = way_[station_number];
     const Station& station = places_[number].station;
     if (!plan_.linear) {
         const int low = std::clamp(static_cast<int>(time / time_step_), 0, last_time_ - 1);
-        if (!know(number, low) || !know(number, low + 1)) failure_ = "no equilibrium was found";
+        if (!know(number, low) || !know(number, low + 1)) fail();
     }
     return station.states.empty() ? nothing(time) : station.at(time);
 }
