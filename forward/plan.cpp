@@ -202,10 +202,12 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         if (crack.grows != Growth::none) least_advance = std::min(least_advance, crack.advance);
     const bool fine_enough = std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells &&
                              least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
-    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough;
+    const bool may_meet = plan.grows && scene.cracks.size() > 1;
+    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet;
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
+               : may_meet              ? "solver.extrapolate asks for a second, but where cracks come near each other it would not see the wood between them"
                : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
                                           : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",

@@ -126,15 +126,23 @@ std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
     if (motions.empty()) return std::nullopt;
     const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
     if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
-    const Eigen::MatrixXd slope = equilibrium_.slopes(numbers_, motions);
+    const Equilibrium::Slopes slope = equilibrium_.slopes(numbers_);
     std::vector<LoadState> found(numbers_.size());
-    for (std::size_t n = 0; n < numbers_.size(); ++n) {
-        found[n].potential = slope(0, n);
-        found[n].power = slope(1, n);
+    for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
+        found[n].potential = slope.potential[n];
+        found[n].power = slope.along(motions[0], n);
         found[n].reactions.assign(boundary.drivers(), Vec2::Zero());
-        found[n].reactions[gauges.force] = slope(2, n) * gauges.force_direction;
-        if (!pulled.empty()) found[n].displacement = -slope(3, n);
+        found[n].reactions[gauges.force] = slope.along(motions[1], n) * gauges.force_direction;
+        if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
+    }
+    // A tip's own G counts where that says when it moves.
+    std::vector<std::vector<Vec2>> moved;
+    for (const GrowingTip& tip : growing_) {
+        if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
+        if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
+        for (std::size_t n = 0; n < numbers_.size(); ++n)
+            found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
     }
     return found;
 }
@@ -157,6 +165,7 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
     move(state.displacement, [](const LoadState& s) { return s.displacement; });
     for (std::size_t d = 0; d < state.reactions.size(); ++d)
         for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
+    for (std::size_t k = 0; k < state.tips.size(); ++k) move(state.tips[k].G, [&](const LoadState& s) { return s.tips[k].G; });
     place.station.states[time] = std::move(state);
 }
 

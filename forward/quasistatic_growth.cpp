@@ -79,7 +79,7 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time));
     std::map<int, Known> guess = from.known;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
-        if (!(tips >> t & 1u)) continue;
+        if (!(tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
         const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.station.states.at(time));
         for (const auto& [added, origin] : equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to))
             for (auto& [time_there, known] : guess) known.displacement.push_back(known.displacement[origin]);
