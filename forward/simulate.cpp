@@ -126,7 +126,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
             break;
         }
         if (plan.grows && all_growing_tips_left(scene, solver)) {
-            recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface");
+            recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface or another crack");
             break;
         }
         if (options.stop_requested && options.stop_requested->load(std::memory_order_relaxed)) {

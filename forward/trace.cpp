@@ -133,19 +133,27 @@ class Tracer {
                 known = know_station(++next, now);
             }
             if (!known) return end(RunStatus::finished, "the crack's way ends here");
-            const bool left = walk_.station(next).left;
+            const bool parted = carries_nothing(next, now);
+            const bool left = walk_.station(next).left || parted;
             if (next > i + 1 || left || critical_[next] <= now) {
                 const Moment after = jump(next, now);
                 add(after, true);
                 here = after;
                 if (beyond_length(after)) return end(RunStatus::finished, "a stop condition was met");
-                if (left) return split();
+                if (left) return parted ? end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more") : split();
             }
             i = next;
         }
     }
 
-    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface"); }
+    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface or another crack"); }
+
+    // The load has gone, but for rounding and what Newton's method leaves.
+    bool carries_nothing(std::size_t i, double now) {
+        constexpr double nothing = 1e-6;
+        if (growing_tips(scene_) < 2 || most_power_ == 0.0) return false;  // a single tip that has gone through says it itself
+        return std::abs(moment(i, now).load.power) <= nothing * most_power_;
+    }
 
     // The unloaded start.
     Moment moment_at_rest() {
@@ -258,6 +266,7 @@ class Tracer {
             row.external_work = m.load.traction_work;
         }
         last_ = m;
+        most_power_ = std::max(most_power_, std::abs(m.load.power));
         record_.series.push_back(row);
     }
 
@@ -314,6 +323,7 @@ class Tracer {
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;
+    double most_power_ = 0;                // [W]
 };
 
 } // namespace

@@ -85,6 +85,17 @@ TEST(HardMeeting, TwoEdgeCracksMeetHeadOn) {
     }
 }
 
+TEST(HardMeeting, ACrackThatPartsTheSpecimenEndsTheRun) {
+    // The other one stands in a piece that nothing pulls any more.
+    const Record record = simulate(square({line({0, 6}, {9, 6}, Growth::end), line({20, 14}, {16, 14}, Growth::end)}));
+    std::printf("two edge cracks of 9 and 4 mm: %s, %s; %.1f and %.1f mm\n", name(record.status), record.message.c_str(),
+                1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back());
+    EXPECT_EQ(record.status, RunStatus::split);
+    EXPECT_NEAR(record.series.back().crack_length, 20e-3, 1e-9);
+    EXPECT_LT(record.cracks[0].length.back(), 10e-3);
+    EXPECT_NEAR(record.series.back().force, 0.0, 1e-9);
+}
+
 TEST(HardMeeting, CracksThatPassEachOtherCurveIn) {
     // En passant, 2.4 cells apart: both grow, the ligament goes, the specimen parts.
     Scene scene = square({line({0, 8.8}, {7, 8.8}, Growth::end), line({20, 11.2}, {13, 11.2}, Growth::end)});
