@@ -11,6 +11,12 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
+double length_of(const std::vector<Vec2>& route) {
+    double length = 0.0;
+    for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();
+    return length;
+}
+
 // Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
 LoadState weighted(const std::vector<const LoadState*>& states, const std::vector<double>& weights) {
     LoadState sum;
@@ -82,7 +88,7 @@ LoadState between(const LoadState& from, const LoadState& to, double time) {
 
 double Station::route_length() const {
     double length = 0.0;
-    for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();
+    for (const MovingTip& tip : moving) length += length_of(tip.route);
     return length;
 }
 
@@ -109,6 +115,17 @@ LoadState LoadState::gone_on(double to) const {
     at.displacement = displacement * ratio;
     for (std::size_t k = 0; k < tips.size(); ++k) at.tips[k].G = tips[k].G * std::pow(ratio, exponent);
     return at;
+}
+
+double mean_toughness(const MaterialMap& materials, const std::vector<MovingTip>& moving) {
+    if (moving.size() == 1 || moving.front().route.size() == 1) return mean_toughness(materials, moving.front().route);
+    double sum = 0.0;
+    double length = 0.0;
+    for (const MovingTip& tip : moving) {
+        sum += length_of(tip.route) * mean_toughness(materials, tip.route);
+        length += length_of(tip.route);
+    }
+    return sum / length;
 }
 
 void extrapolate(LoadState& fine, const LoadState& coarse) {
@@ -149,8 +166,8 @@ LoadState Station::at(double time) const {
 }
 
 double Station::critical_time(double toughness, bool beyond) const {
-    const std::size_t tip = 2 * crack + at_end;
-    const bool finite_advance = route.size() > 1;
+    const std::size_t tip = 2 * moving.front().crack + moving.front().at_end;
+    const bool finite_advance = route_length() > 0.0;
     const double needed = finite_advance ? toughness * route_length() * thickness : toughness;
     // Where what is released and what it costs are both known: what is left over [J, or J/m^2 for advance 0], and its slope.
     std::vector<double> time, excess, slope;

@@ -58,6 +58,7 @@ void Equilibrium::renumber() {
     mass_ = field_masses(body_, fields);
     equation_.assign(2 * fields, 0);
     for (const Boundary::Held& held : boundary_.held) equation_[2 * held.field + held.axis] = -1;
+    for (const int dof : pieces_.holds) equation_[dof] = -1;
     std::vector<int> count(body_.layout.nodes(), 0);
     for (int dof = 0; dof < 2 * fields; ++dof) {
         if (mass_[dof / 2] == 0.0) equation_[dof] = -1;
@@ -82,6 +83,9 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
     boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
+    // A tip that ends may cut a piece free; where bodies slide, contact decides what can move.
+    if (sliding_.empty() && (!cracks_.lines[crack].tip(at_end).inside || !pieces_.holds.empty()))
+        pieces_ = find_loose_pieces(body_, cracks_, boundary_, field_masses(body_, cracks_.fields()));
     renumber();
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
@@ -89,7 +93,7 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
 
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
     const double gap = (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal);
-    if (gap >= 0.0) return Mat2::Zero();
+    if (gap >= 0.0 || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
     const double stiffness = face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
     if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) return stiffness * Mat2::Identity();
     return stiffness * pair.normal * pair.normal.transpose();
@@ -398,24 +402,37 @@ double Equilibrium::power() const {
     return power;
 }
 
-TipLoad Equilibrium::load_at(int crack, bool at_end) const {
+TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const {
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
-    const std::vector<Vec2> still(displacement_.size(), Vec2::Zero());
-    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, still, still}, options);
+    const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
+    return tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still}, options);
 }
 
-Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, displacement_, time_}; }
+// Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
+void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
+    int last = -1;
+    for (int p = 0; p < body_.points.count(); ++p) {
+        const int c = body_.points.cell[p];
+        if (c == last || before[p] == body_.points.node[p]) continue;
+        last = c;
+        body_.for_cells_in({body_.layout.cell_corner(c) - 0.5 * body_.layout.cell, body_.layout.cell_corner(c) + 1.5 * body_.layout.cell},
+                           [&](int near) { factor_.mark(near); });
+    }
+}
+
+Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_}; }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
-    body_.points.node = snapshot.node;
+    const std::vector<std::array<int, 4>> before = std::exchange(body_.points.node, snapshot.node);
     boundary_.held = snapshot.held;
+    pieces_ = snapshot.pieces;
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;
     internal_force_.sort_cells();
     renumber();
-    factor_.mark_all();
+    mark_changes(before);
     find_forces();
 }
 

@@ -10,12 +10,8 @@ namespace crampfit {
 
 KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, int threads)
     : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers), threads_(threads) {
-    int tips = 0;
-    for (const Crack& crack : scene_.cracks) tips += crack.grows == Growth::both ? 2 : crack.grows != Growth::none;
-    reusable_ = plan_.quasistatic && tips <= 1;
-    has_slopes_ = reusable_;
-    for (const Crack& crack : scene_.cracks) has_slopes_ = has_slopes_ && (crack.grows == Growth::none || crack.advance > 0.0);
-    if (!has_slopes_) numbers_.clear();
+    reusable_ = plan_.quasistatic && growing_tips(scene_) <= 1;
+    if (!has_slopes()) numbers_.clear();
 }
 
 Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool rough) {

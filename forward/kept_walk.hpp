@@ -19,8 +19,8 @@ class KeptWalk {
     /// Equations are solved by `threads` threads.
     explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {}, int threads = 1);
 
-    /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had.
-    bool has_slopes() const { return has_slopes_; }
+    /// False where it is not reusable: derivatives are those on the way of the crack as it is.
+    bool has_slopes() const { return reusable_; }
 
     /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
     bool reusable() const { return reusable_; }
@@ -36,7 +36,6 @@ class KeptWalk {
     std::vector<std::string> numbers_;
     int threads_ = 1;
     bool reusable_ = false;
-    bool has_slopes_ = false;
     std::mutex mutex_;
     std::unique_ptr<Quasistatic> walk_;
 };
