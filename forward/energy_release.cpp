@@ -1,5 +1,6 @@
 #include "forward/energy_release.hpp"
 
+#include "forward/face_pieces.hpp"
 #include "forward/near_tip_field.hpp"
 
 #include <Eigen/LU>
@@ -99,10 +100,14 @@ class Extension {
     Vec2 at(int node) const {
         const Layout& layout = body_.layout;
         const Vec2 x = layout.node_position(node);
-        const double distance = (x - line_.tip(at_end_).position).norm();
-        if (distance >= outer || on_outline(node)) return Vec2::Zero();
-        const double size = distance <= inner ? 1.0 : (outer - distance) / (outer - inner);
+        const double size = size_at(x);
+        if (size == 0.0 || on_outline(node)) return Vec2::Zero();
         return size * line_.direction_near(at_end_, x);
+    }
+
+    double size_at(const Vec2& x) const {
+        const double distance = (x - line_.tip(at_end_).position).norm();
+        return std::clamp((outer - distance) / (outer - inner), 0.0, 1.0);
     }
 
   private:
@@ -214,6 +219,22 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
     return Polar(sum / count).turn;
 }
 
+// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the middle.
+double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end, const Extension& extension,
+                      const std::vector<Vec2>& displacement, double thickness) {
+    const CrackLine& line = cracks.lines[crack];
+    double sum = 0.0;
+    for (const FacePiece& piece : pieces) {
+        const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
+        if (size == 0.0 || piece.far <= piece.near) continue;
+        const auto jump = [&](double behind) {
+            return Vec2((at_end ? 1.0 : -1.0) * cracks.opening(crack, line.behind(at_end, behind), displacement));
+        };
+        sum += piece.force.dot(jump(piece.near) - jump(piece.far)) / (piece.far - piece.near) * size;
+    }
+    return -sum / thickness;
+}
+
 // On the left of the crack, seen toward the tip.
 bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     double nearest = std::numeric_limits<double>::infinity();
@@ -284,10 +305,10 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // with a, t the near-tip displacement and stress of unit K in wood of compliance S, that at the tip; G = K^T H K gives
 // K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen
 // from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
-// Left out: tractions on closed faces, the speed of a running tip in a and t, and the traction that t puts on the faces of a crack
-// that bends within the domain.
+// Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2.
+// Left out: the speed of a running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
 Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
-                       const Extension& extension, const NodalState& nodal, bool rotates) {
+                       const Extension& extension, const NodalState& nodal, const std::vector<FacePiece>& pieces, bool rotates) {
     const Points& points = body.points;
     const CrackTip& tip = line.tip(at_end);
     const Mat2 turn = mean_turn(body, tip.position, extension, nodal);
@@ -318,6 +339,15 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
             sum[mode] += integrand * points.volume[p];
         }
     });
+    const auto left = field.at(1.0, std::numbers::pi), right = field.at(1.0, -std::numbers::pi);
+    for (const FacePiece& piece : pieces) {
+        const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
+        if (size == 0.0) continue;
+        const Vec2 force = (turn * axes).transpose() * piece.force;
+        const double mean_root = 2.0 / (std::sqrt(piece.near) + std::sqrt(piece.far));  // of r^-1/2 along the piece
+        for (int mode = 0; mode < 2; ++mode)
+            sum[mode] -= force.dot(left[mode].gradient.col(0) - right[mode].gradient.col(0)) * mean_root * size;
+    }
     return 0.5 / body.layout.thickness * field.release().inverse() * sum;
 }
 
@@ -342,11 +372,12 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     TipLoad load;
     load.toughness = wood.toughness;
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
-    load.G = J.G;
+    const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
+    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, body.layout.thickness);
     load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
-    const Vec2 K = intensity_factors(body, line, at_end, field, extension, state, options.rotates);
+    const Vec2 K = intensity_factors(body, line, at_end, field, extension, state, pieces, options.rotates);
     load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
     load.K_II = K[1];
     // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: with

@@ -123,7 +123,7 @@ Eigen::MatrixXd Equilibrium::slopes(const std::vector<MaterialSlope>& numbers, c
     }
     // So are bodies' springs.
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
-        for (const SlidingBody::Touch& touch : sliding_[s].touches(boundary_.travel(sliding_driver_[s], time_), displacement_)) {
+        for (const SlidingBody::Touch& touch : sliding_[s].touches(place_of(sliding_driver_[s]), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const int stiffest = points.stiffness[0][facet.point] >= points.stiffness[2][facet.point] ? 0 : 1;
             for (std::size_t n = 0; n < numbers.size(); ++n) {

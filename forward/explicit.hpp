@@ -17,7 +17,7 @@ struct EnergyBooks {
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
     double fracture = 0;  // toughness times new crack area
-    double damped = 0;
+    double damped = 0;    // by drag and friction
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
@@ -78,6 +78,7 @@ class ExplicitSolver {
     std::vector<Vec2> force_;         // [N]
 
     std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
+    std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
     std::vector<TipLoad> tip_loads_;
     std::vector<double> last_growth_; // [two a crack] [s]
     double time_ = 0.0;

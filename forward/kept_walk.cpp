@@ -12,8 +12,8 @@ KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers)
     : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers) {
     int tips = 0;
     for (const Crack& crack : scene_.cracks) tips += crack.grows == Growth::both ? 2 : crack.grows != Growth::none;
-    reusable_ = plan_.quasistatic && tips <= 1;
-    has_slopes_ = reusable_;
+    reusable_ = plan_.quasistatic && tips <= 1 && !plan_.friction;
+    has_slopes_ = reusable_ && !plan_.free_bodies;
     for (const Crack& crack : scene_.cracks) has_slopes_ = has_slopes_ && (crack.grows == Growth::none || crack.advance > 0.0);
     if (!has_slopes_) numbers_.clear();
 }

@@ -18,10 +18,12 @@ class KeptWalk {
     /// `simulate` does.
     explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {});
 
-    /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had.
+    /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had. Nor where bodies follow a
+    /// force.
     bool has_slopes() const { return has_slopes_; }
 
-    /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
+    /// False where toughness changes more than when the crack moves: in explicit dynamics, with several growing tips, or with
+    /// friction, where a state hangs on the way to it.
     bool reusable() const { return reusable_; }
 
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. One run at a

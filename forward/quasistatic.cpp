@@ -209,7 +209,7 @@ bool Quasistatic::know_linear(std::size_t number) {
         ++equilibria_;
         return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
     };
-    if (equilibrium_.boundary().tractions.empty()) {  // all goes with the load or its square
+    if (!equilibrium_.boundary().has_dead_load()) {  // all goes with the load or its square
         const bool good = solve(2);
         if (!good && !places_[number].station.left) return false;
         const LoadState full = good ? load_state() : nothing(time_of(2));
@@ -229,12 +229,16 @@ bool Quasistatic::know_linear(std::size_t number) {
     }
     if (!solve(0)) return false;
     const std::vector<Vec2> unloaded = equilibrium_.displacements();
+    const Equilibrium::Contacts before = equilibrium_.contacts();
     if (plan_.driven && !solve(2)) return false;
     const std::vector<Vec2> loaded = equilibrium_.displacements();
+    Equilibrium::Contacts between = equilibrium_.contacts();
+    const std::vector<Vec2> moved = between.moved;
     for (const int time : {0, 1, 2}) {
         std::vector<Vec2> u(unloaded.size());
         for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
-        equilibrium_.set_displacements(u, time_of(time));
+        for (std::size_t d = 0; d < moved.size(); ++d) between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
+        equilibrium_.set_displacements(u, time_of(time), between);
         keep(number, time, load_state());
         if (numbers_.empty()) continue;
         auto slopes = slopes_here();
@@ -267,14 +271,14 @@ bool Quasistatic::solve_for(Place& place, int time) {
     int nearest = std::numeric_limits<int>::max();
     for (const auto* all : {&place.known, &place.guess}) {
         for (const auto& [number, known] : *all) {
-            if (std::abs(number - time) >= nearest) continue;
+            if (std::abs(number - time) >= nearest || (plan_.friction && number > time)) continue;  // friction: by loading alone
             nearest = std::abs(number - time);
             from = known;
         }
     }
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
-        equilibrium_.set_displacements(from.displacement, time_of(from.time));
+        equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
         double potential = from.potential;
         double power = from.power;
         bool good = true;
@@ -311,9 +315,9 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
     if (coarse_ && !coarse_->walk.know_slopes(number, time)) return false;
     std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));  // of what carries nothing
     const auto known = place.known.find(time);
-    if (known != place.known.end() && (time > 0 || !equilibrium_.boundary().tractions.empty())) {
+    if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
         enter(place);
-        equilibrium_.set_displacements(known->second.displacement, time_of(time));
+        equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
         auto here = slopes_here();
         if (!here) return false;
         slopes = std::move(*here);
@@ -326,14 +330,14 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
     if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
-    if (time == 0 && equilibrium_.boundary().tractions.empty()) {
+    if (time == 0 && !equilibrium_.boundary().has_dead_load()) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
         keep(number, 0, nothing(0.0));
         return true;
     }
     if (solve_for(place, time)) {
-        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
+        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
         return true;
     }
@@ -375,7 +379,7 @@ bool Quasistatic::extend(double now) {
         time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
         if (!know(places_.size() - 1, time)) return false;
         enter(last);
-        equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time));
+        equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time), last.known.at(time).contacts);
     }
     const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
     const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));

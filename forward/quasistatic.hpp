@@ -61,6 +61,7 @@ class Quasistatic {
         std::vector<Vec2> displacement;                 // [fields] [m]
         double potential;                               // [J]
         double power;                                   // [W]
+        Equilibrium::Contacts contacts = {};
     };
     struct Place {
         Station station;
