@@ -82,17 +82,23 @@ void read_motion(const Entry& entry, Body& body) {
     const std::vector<Entry> components = velocity_components(velocity);
     for (std::size_t axis = 0; axis < 2; ++axis) {
         body.free[axis] = is_free(components[axis]);
-        if (!body.free[axis]) body.velocity[static_cast<Eigen::Index>(axis)] = components[axis].number(limits::velocity);
+        if (!body.free[axis]) {
+            body.velocity[static_cast<Eigen::Index>(axis)] = components[axis].number(limits::velocity);
+        }
     }
     const auto force = entry.find("force");
     if (!force) {
-        if (body.free[0] || body.free[1]) velocity.fail("a free component follows a force: give force = [\"0 N\", ...]");
+        if (body.free[0] || body.free[1]) {
+            velocity.fail("a free component follows a force: give force = [\"0 N\", ...]");
+        }
         return;
     }
     const std::vector<Entry> forces = force->list(2, "two forces, such as [\"0 N\", \"-3 N\"]");
     for (std::size_t axis = 0; axis < 2; ++axis) {
         const double value = forces[axis].number(limits::force);
-        if (!body.free[axis] && value != 0.0) forces[axis].fail("the velocity prescribes this component: make it \"free\" to let it follow a force");
+        if (!body.free[axis] && value != 0.0) {
+            forces[axis].fail("the velocity prescribes this component: make it \"free\" to let it follow a force");
+        }
         body.force[static_cast<Eigen::Index>(axis)] = value;
     }
 }

@@ -111,11 +111,31 @@ Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) c
                 stiffness_[touch.facet], is_kept ? *kept : Grip{});
 }
 
+// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a force
+// that falls evenly [J].
+double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const {
+    double energy = 0.0;
+    auto touch = pushed_.begin();
+    for (const Grip& grip : grips_) {
+        while (touch != pushed_.end() && touch->facet < grip.place) ++touch;
+        if (touch != pushed_.end() && touch->facet == grip.place) continue;
+        const double held = stiffness_[grip.place] * grip.stretch;
+        energy += 0.5 * held * grip.stretch;
+        const Vec2 place = current(body_.facets[grip.place], displacement) - moved;
+        double depth = 0.0, curvature = 0.0;
+        Vec2 normal = Vec2::Zero();
+        if (!depth_in(shape_, place_[grip.place], depth, normal, curvature)) continue;
+        const double touched = depth / (depth - std::min(0.0, signed_depth(shape_, place)));  // share of the way
+        energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(normal));
+    }
+    return energy;
+}
+
 void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacement) {
     if (friction_ == 0.0) return;
     dissipated_ += std::exchange(sliding_now_, 0.0);
     grips_.clear();
-    for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch, touch.drag.limit});
+    for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
     const auto keep = [&](int i) { place_[i] = current(body_.facets[i], displacement) - moved; };
     if (steps_between_searches_ > 1) std::for_each(near_.begin(), near_.end(), keep);
     else for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
@@ -180,6 +200,7 @@ Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement,
         stored_energy_ += touch.energy + touch.drag.energy;
         sliding_now_ += touch.drag.dissipated;
     }
+    if (friction_ > 0.0) sliding_now_ += taken_off(moved, displacement);
     return total;
 }
 

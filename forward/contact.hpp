@@ -50,6 +50,7 @@ class SlidingBody {
 
   private:
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
+    double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
     Vec2 current(const Facet& facet, const std::vector<Vec2>& displacement) const;
 

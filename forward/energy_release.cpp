@@ -219,9 +219,10 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
     return Polar(sum / count).turn;
 }
 
-// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the middle.
-double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end, const Extension& extension,
-                      const std::vector<Vec2>& displacement, double thickness) {
+// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the
+// middle.
+double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end,
+                      const Extension& extension, const std::vector<Vec2>& displacement, double thickness) {
     const CrackLine& line = cracks.lines[crack];
     double sum = 0.0;
     for (const FacePiece& piece : pieces) {
@@ -230,26 +231,28 @@ double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& c
         const auto jump = [&](double behind) {
             return Vec2((at_end ? 1.0 : -1.0) * cracks.opening(crack, line.behind(at_end, behind), displacement));
         };
-        sum += piece.force.dot(jump(piece.near) - jump(piece.far)) / (piece.far - piece.near) * size;
+        const Vec2 at_near = piece.near > 0.0 ? jump(piece.near) : Vec2(Vec2::Zero());
+        sum += piece.force.dot(at_near - jump(piece.far)) / (piece.far - piece.near) * size;
     }
     return -sum / thickness;
 }
 
-// On the left of the crack, seen toward the tip.
+// On the left of the crack, seen toward the tip. What lies on it counts as left of the way from start to end, as its fields do.
 bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
     for (std::size_t k = 0; k + 1 < line.points.size(); ++k) {
         const Vec2 along = line.points[k + 1] - line.points[k];
         const Vec2 arm = x - line.points[k] - nearest_on_segment(line.points[k], line.points[k + 1], x) * along;
-        const double here = (at_end ? 1.0 : -1.0) * cross(along.normalized(), arm);
+        const double here = cross(along.normalized(), arm);
         const double distance = arm.norm();
         // Nearest to a corner: the segment that x stands off farther knows the side.
         const bool as_near = distance < nearest * (1.0 + 1e-9);
         if (distance < nearest * (1.0 - 1e-9) || (as_near && std::abs(here) > std::abs(side))) side = here;
         nearest = std::min(nearest, distance);
     }
-    return side > 0.0;
+    const double rounding = 1e-10 * line.length;
+    return at_end == (side >= -rounding);
 }
 
 // Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi on
@@ -378,7 +381,9 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, line, at_end, field, extension, state, pieces, options.rotates);
-    load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
+    // Faces that press on each other next to the tip leave no mode I.
+    const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) { return piece.near < 2.0 * h; });
+    load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];
     // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: with
     // the tip 3 cells off a boundary J is 7 % low (ring specimen against finite elements) and K^2 / E' is within 1 %.

@@ -59,9 +59,10 @@ void Equilibrium::renumber() {
     equation_.assign(2 * fields, 0);
     free_of_dof_.assign(2 * fields, -1);
     for (const Boundary::Held& held : boundary_.held) {
-        equation_[2 * held.field + held.axis] = -1;
+        const int dof = 2 * held.field + held.axis;
+        equation_[dof] = -1;
         for (std::size_t k = 0; k < free_.size(); ++k)
-            if (free_[k].driver == held.driver && free_[k].axis == held.axis) free_of_dof_[2 * held.field + held.axis] = static_cast<int>(k);
+            if (free_[k].driver == held.driver && free_[k].axis == held.axis) free_of_dof_[dof] = static_cast<int>(k);
     }
     std::vector<int> count(body_.layout.nodes(), 0);
     for (int dof = 0; dof < 2 * fields; ++dof) {

@@ -42,6 +42,7 @@ class Equilibrium {
     double potential() const;                      // Pi [J]
     double strain_energy() const;                  // in the points and in the ties [J]
     double traction_work() const;                  // of tractions and forces on bodies, times displacement [J]
+    double dissipated() const;                     // by friction so far [J]
     double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]

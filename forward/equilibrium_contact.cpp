@@ -23,16 +23,17 @@ constexpr double no_stiffness = 1e-9;
 
 void Equilibrium::find_free_bodies() {
     moved_.assign(boundary_.drivers(), Vec2::Zero());
-    for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+    for (int b = 0; b < static_cast<int>(scene_.bodies.size()); ++b)
         for (int axis = 0; axis < 2; ++axis)
-            if (scene_.bodies[b].free[axis]) free_.push_back({boundary_.first_body() + static_cast<int>(b), axis, scene_.bodies[b].force[axis]});
+            if (scene_.bodies[b].free[axis]) free_.push_back({boundary_.first_body() + b, axis, scene_.bodies[b].force[axis]});
     for (std::size_t i = 0; i < sliding_.size(); ++i) seat(static_cast<int>(i));
     seat_ = moved_;
-    const bool faces_rub = std::any_of(scene_.cracks.begin(), scene_.cracks.end(), [](const Crack& c) { return c.faces.coefficient > 0.0; });
-    if (faces_rub) settled_ = displacement_;
+    const auto rubs = [](const Crack& crack) { return crack.faces.coefficient > 0.0; };
+    if (std::any_of(scene_.cracks.begin(), scene_.cracks.end(), rubs)) settled_ = displacement_;
 }
 
-// Moves a body along its force until its springs, on the specimen as it stands, carry that. Newton's method needs a touch to begin with.
+// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to begin
+// with.
 void Equilibrium::seat(int sliding) {
     const int driver = sliding_driver_[sliding];
     const Body& rigid = scene_.bodies[driver - boundary_.first_body()];
@@ -41,19 +42,19 @@ void Equilibrium::seat(int sliding) {
     const Vec2 way = rigid.force / load;
     const auto carries = [&](double gone) {
         double force = 0.0;
-        for (const SlidingBody::Touch& touch : sliding_[sliding].touches(gone * way, displacement_)) force += touch.force * touch.normal.dot(way);
+        for (const SlidingBody::Touch& touch : sliding_[sliding].touches(gone * way, displacement_))
+            force += touch.force * touch.normal.dot(way);
         return force >= load;
     };
     const Box box = bounds(rigid.shape);
-    const Vec2 size = body_.layout.size();
-    const Vec2 farthest = (box.low.cwiseAbs() + box.high.cwiseAbs() + size);
+    const Vec2 farthest = box.low.cwiseAbs() + box.high.cwiseAbs() + body_.layout.size();
     const double step = seating_step * body_.layout.cell.minCoeff();
     double high = 0.0;
     while (!carries(high)) {
         high += step;
         if (high > farthest.norm())
-            throw InputError(scene_.file.string(), "bodies." + rigid.name + ".force", fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()),
-                             "the body meets nothing on this way that could carry the force");
+            throw InputError(scene_.file.string(), "bodies." + rigid.name + ".force",
+                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()), "the body meets nothing on this way that could carry the force");
     }
     double low = std::max(0.0, high - step);
     for (int k = 0; k < bisections; ++k) (carries(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
@@ -77,7 +78,8 @@ Eigen::VectorXd Equilibrium::out_of_balance() const {
     return forces;
 }
 
-// With unknowns v of the free bodies K u - B v = r, S v - B^T u = q, so that (S - B^T K^-1 B) v = q + B^T K^-1 r and u = K^-1 (r + B v).
+// With unknowns v of the free bodies K u - B v = r, S v - B^T u = q, so that (S - B^T K^-1 B) v = q + B^T K^-1 r and
+// u = K^-1 (r + B v).
 bool Equilibrium::border_tangent() {
     if (free_.empty()) return true;
     free_motion_ = free_load_;
@@ -156,7 +158,8 @@ Drag Equilibrium::face_drag(std::size_t k) const {
     const double stiffness = pair.normal.dot(face_stiffness(pair) * pair.normal);
     if (stiffness == 0.0) return {};
     const double depth = -jump.dot(pair.normal);
-    const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, std::min(0.0, -before.dot(pair.normal)), jump - before};
+    const double depth_before = std::min(0.0, -before.dot(pair.normal));
+    const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, depth_before, jump - before};
     return drag(pressing, friction, stiffness, k < face_grips_.size() ? face_grips_[k] : Grip{});
 }
 
@@ -179,11 +182,17 @@ void Equilibrium::settle() {
     std::vector<Grip> grips(cracks_.pairs.size());
     for (std::size_t k = 0; k < grips.size(); ++k) {
         const Drag drag = face_drag(k);
-        grips[k] = {static_cast<int>(k), drag.stretch, drag.limit};
+        grips[k] = {static_cast<int>(k), drag.stretch};
         face_dissipated_ += drag.dissipated;
     }
     face_grips_ = std::move(grips);
     settled_ = displacement_;
+}
+
+double Equilibrium::dissipated() const {
+    double sum = face_dissipated_;
+    for (const SlidingBody& body : sliding_) sum += body.dissipated();
+    return sum;
 }
 
 Equilibrium::Contacts Equilibrium::contacts() const {

@@ -117,12 +117,10 @@ void ExplicitSolver::close_crack_faces() {
         if (faces.kind == CrackFaces::Kind::stick) change -= rate.dot(along) * along;
         if (faces.coefficient > 0.0) {  // Coulomb's law of impulses
             const double most = faces.coefficient * too_fast;
-            const double slows = std::clamp(-rate.dot(along), -most, most);
-            change += slows * along;
-            const Vec2 rate_before = rate - dt * (acceleration_[pair.left] - acceleration_[pair.right]);
-            const double mean_rate = 0.5 * (rate_before.dot(along) + rate.dot(along) + slows);
-            books_.damped -= m_left * m_right / total * slows * mean_rate;
+            change += std::clamp(-rate.dot(along), -most, most) * along;
         }
+        const Vec2 rate_before = rate - dt * (acceleration_[pair.left] - acceleration_[pair.right]);
+        books_.damped -= m_left * m_right / total * change.dot(0.5 * (rate_before + rate + change));
         face_force_[k] = m_left * m_right / total / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;

@@ -30,24 +30,19 @@ double distance_behind(const CrackLine& line, bool at_end, const Vec2& x) {
 
 } // namespace
 
-std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at_end, std::span<const Vec2> forces, const Layout& layout) {
-    struct Place {
-        double behind;
-        Vec2 force;
-    };
-    std::vector<Place> places;
+std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at_end, std::span<const Vec2> forces,
+                                   const Layout& layout) {
+    const CrackLine& line = cracks.lines[crack];
+    const double width = line.tip(at_end).direction.cwiseProduct(layout.cell).lpNorm<1>();
+    std::vector<FacePiece> pieces;
     for (std::size_t k = 0; k < forces.size(); ++k) {
         const FieldPair& pair = cracks.pairs[k];
-        if (pair.crack != crack) continue;
-        const double behind = distance_behind(cracks.lines[crack], at_end, layout.node_position(pair.node));
-        if (behind > 0.0) places.push_back({behind, at_end ? forces[k] : Vec2(-forces[k])});
-    }
-    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.behind < b.behind; });
-    std::vector<FacePiece> pieces;
-    for (std::size_t k = 0; k < places.size(); ++k) {
-        const double near = k == 0 ? 0.0 : 0.5 * (places[k - 1].behind + places[k].behind);
-        const double far = k + 1 < places.size() ? 0.5 * (places[k].behind + places[k + 1].behind) : places[k].behind;
-        if (!places[k].force.isZero()) pieces.push_back({places[k].force, near, far});
+        if (pair.crack != crack || forces[k].isZero()) continue;
+        const double behind = distance_behind(line, at_end, layout.node_position(pair.node));
+        const double near = std::max(0.0, behind - 0.5 * width), far = behind + 0.5 * width;
+        if (far <= near) continue;
+        const double share = (at_end ? 1.0 : -1.0) * (far - near) / width;
+        pieces.push_back({share * forces[k], near, far});
     }
     return pieces;
 }

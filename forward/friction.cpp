@@ -30,7 +30,7 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     result.limit = coefficient * pressing.force;
     const double longest = result.limit / stiffness;
     result.stretch = std::clamp(trial, -longest, longest);
-    const double slid = std::abs(trial - result.stretch);
+    const double slid = trial - result.stretch;
 
     const double force = -stiffness * result.stretch;
     result.force = force * t;
@@ -45,8 +45,8 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     }
     result.tangent = -t * slope.transpose() + force * pressing.curvature * n * t.transpose();
     result.energy = 0.5 * stiffness * result.stretch * result.stretch;
-    // While it slides the force is the limit, which goes from one end of the way to the other.
-    result.dissipated = slid * 0.5 * (result.limit + (is_new ? 0.0 : before.limit));
+    // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before + slid).
+    result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * slid;
     return result;
 }
 

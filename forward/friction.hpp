@@ -13,7 +13,6 @@ namespace crampfit {
 struct Grip {
     int place = 0;         // which facet or pair of crack faces
     double stretch = 0.0;  // of the spring along the surface [m]
-    double limit = 0.0;    // friction coefficient times the normal force [N]
 };
 
 /// A place where two surfaces press on each other, and how it got there from the state that was kept last.

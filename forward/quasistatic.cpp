@@ -112,6 +112,7 @@ LoadState Quasistatic::load_state() const {
     state.potential = equilibrium_.potential();
     state.power = equilibrium_.power();
     state.traction_work = equilibrium_.traction_work();
+    state.dissipated = equilibrium_.dissipated();
     state.displacement = equilibrium_.measured_displacement(state.time);
     state.reactions = equilibrium_.reactions();
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
