@@ -50,6 +50,7 @@ inline constexpr NumberRule density = positive(dimension::density);
 inline constexpr NumberRule toughness = positive(dimension::energy_release_rate);
 inline constexpr NumberRule velocity = finite(dimension::velocity);
 inline constexpr NumberRule traction = finite(dimension::pressure);
+inline constexpr NumberRule force = finite(dimension::force);
 inline constexpr NumberRule until = positive(dimension::time);
 inline constexpr NumberRule friction = not_negative(dimension::number);
 inline constexpr NumberRule advance = not_negative(dimension::length);

@@ -121,6 +121,9 @@ class NumberFinder {
         if (number == scene_.cracks.size()) {
             fail(fmt::format(": there is no crack {}; cracks are numbered from 0", part(1)));
         }
+        if (part(2) == "faces") {
+            return friction(scene_.cracks[number].faces, CrackFaces::Kind::friction);
+        }
         return member({{"advance", {&scene_.cracks[number].advance, limits::advance}}}, 2);
     }
 
@@ -155,8 +158,27 @@ class NumberFinder {
     }
 
     SceneNumber in_body() const {
-        const Vec2& v = named(scene_.bodies).velocity;
-        return velocity(&v.x(), &v.y());
+        const Body& body = named(scene_.bodies);
+        if (part(2) == "contact") {
+            return friction(body.contact, Contact::Kind::friction);
+        }
+        if (part(2) == "force") {
+            const SceneNumber number = member({{"0", {body.free[0] ? &body.force.x() : nullptr, limits::force}},
+                                               {"1", {body.free[1] ? &body.force.y() : nullptr, limits::force}}}, 3);
+            if (number.value == nullptr) {
+                fail(": this component's velocity is prescribed");
+            }
+            return number;
+        }
+        return velocity(body.free[0] ? nullptr : &body.velocity.x(), body.free[1] ? nullptr : &body.velocity.y());
+    }
+
+    /// The coefficient of a contact or of crack faces, in the last part of the key.
+    template <class Meeting> SceneNumber friction(const Meeting& meeting, typename Meeting::Kind rubs) const {
+        if (meeting.kind != rubs) {
+            fail(": there is no friction here");
+        }
+        return member({{"friction", {&meeting.coefficient, limits::friction}}}, 3);
     }
 
     const Scene& scene_;

@@ -32,8 +32,8 @@ std::vector<std::string> check_names(const Scene& scene, const Entry& root) {
     return names;
 }
 
-/// What is measured where the scene does not say: the first edge or body that moves, else the first under traction,
-/// else the first.
+/// What is measured where the scene does not say: the first edge or body that moves, else the first under a traction
+/// or force, else the first.
 std::string default_measure(const Scene& scene, const std::vector<std::string>& names) {
     for (const Edge& edge : scene.edges) {
         if (edge.velocity[0].value_or(0) != 0 || edge.velocity[1].value_or(0) != 0) {
@@ -48,6 +48,11 @@ std::string default_measure(const Scene& scene, const std::vector<std::string>& 
     for (const Edge& edge : scene.edges) {
         if (edge.traction) {
             return edge.name;
+        }
+    }
+    for (const Body& body : scene.bodies) {
+        if (body.force != Vec2::Zero()) {
+            return body.name;
         }
     }
     return names.front();

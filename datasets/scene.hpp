@@ -145,8 +145,10 @@ struct Body {
     std::string name;
     Shape shape;
     Contact contact;
-    Vec2 velocity = Vec2::Zero();  // [m/s]
+    Vec2 velocity = Vec2::Zero();  // [m/s]; nothing in a free component
     std::optional<double> until;   // moves until then, then holds still [s]
+    std::array<bool, 2> free{false, false};  // components that follow the force
+    Vec2 force = Vec2::Zero();     // on the body in its free components, from the start on [N]; nothing in the others
 };
 
 enum class Growth { none, start, end, both };

@@ -76,6 +76,33 @@ Edge read_edge(const Entry& entry, const Vec2& specimen_size) {
     return edge;
 }
 
+/// Each component of a body's motion is either prescribed or free to follow a force.
+void read_motion(const Entry& entry, Body& body) {
+    const Entry velocity = entry.at("velocity");
+    const std::vector<Entry> components = velocity_components(velocity);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+        body.free[axis] = is_free(components[axis]);
+        if (!body.free[axis]) {
+            body.velocity[static_cast<Eigen::Index>(axis)] = components[axis].number(limits::velocity);
+        }
+    }
+    const auto force = entry.find("force");
+    if (!force) {
+        if (body.free[0] || body.free[1]) {
+            velocity.fail("a free component follows a force: give force = [\"0 N\", ...]");
+        }
+        return;
+    }
+    const std::vector<Entry> forces = force->list(2, "two forces, such as [\"0 N\", \"-3 N\"]");
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+        const double value = forces[axis].number(limits::force);
+        if (!body.free[axis] && value != 0.0) {
+            forces[axis].fail("the velocity prescribes this component: make it \"free\" to let it follow a force");
+        }
+        body.force[static_cast<Eigen::Index>(axis)] = value;
+    }
+}
+
 Body read_body(const Entry& entry, std::size_t number) {
     entry.only({"name", "circle", "polygon", "contact", "velocity", "force", "until"});
     Body body;
@@ -86,16 +113,7 @@ Body read_body(const Entry& entry, std::size_t number) {
         body.contact = read_meeting<Contact>(
             *contact, {{"frictionless", Contact::Kind::frictionless}, {"bonded", Contact::Kind::bonded}});
     }
-    if (const auto force = entry.find("force")) {
-        force->fail("a body under a force is not supported yet");
-    }
-    const std::vector<Entry> components = velocity_components(entry.at("velocity"));
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-        if (is_free(components[axis])) {
-            components[axis].fail("a body with a free component is not supported yet");
-        }
-        body.velocity[static_cast<Eigen::Index>(axis)] = components[axis].number(limits::velocity);
-    }
+    read_motion(entry, body);
     if (const auto until = entry.find("until")) {
         body.until = until->number(limits::until);
     }

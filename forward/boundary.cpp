@@ -47,7 +47,10 @@ Gauges::Gauges(const Scene& scene) {
     const auto direction_of = [&](int driver) {
         Vec2 drive = Vec2::Zero();
         if (driver >= edges) {
-            if (driver - edges < static_cast<int>(scene.bodies.size())) drive = scene.bodies[driver - edges].velocity;
+            if (driver - edges < static_cast<int>(scene.bodies.size())) {
+                const Body& body = scene.bodies[driver - edges];
+                drive = body.velocity.isZero() ? body.force : body.velocity;
+            }
         } else if (scene.edges[driver].traction) {
             drive = *scene.edges[driver].traction;
         } else {
@@ -169,6 +172,11 @@ Vec2 Boundary::velocity_of(int driver) const {
 }
 
 Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
+
+bool Boundary::has_dead_load() const {
+    const auto is_loaded = [](const Body& rigid) { return !rigid.force.isZero(); };
+    return !tractions.empty() || std::any_of(scene_.bodies.begin(), scene_.bodies.end(), is_loaded);
+}
 
 std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std::size_t fields) const {
     if (driver >= edges_ || !scene_.edges[driver].traction) return {};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace crampfit {
 
@@ -38,12 +39,22 @@ bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, doubl
     return true;
 }
 
+// How deep a place lies in the shape; below 0: that far outside [m].
+double signed_depth(const Shape& shape, const Vec2& x) {
+    if (const auto* circle = std::get_if<Circle>(&shape)) return circle->radius - (x - circle->centre).norm();
+    const double distance = nearest_on_outline(shape, x).distance;
+    return inside(shape, x) ? distance : -distance;
+}
+
 } // namespace
 
-SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body) : shape_(shape), body_(body) {
+SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
+    : shape_(shape), body_(body), friction_(friction) {
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets)
         stiffness_.push_back(stiffness_in_cells * body.points.stiffest(f.point) / h * f.length * body.layout.thickness);
+    if (friction_ > 0.0)
+        for (const Facet& f : body.facets) place_.push_back(f.position);
 }
 
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
@@ -81,9 +92,61 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
     const Box box = bounds(shape_);
     const Vec2 margin = search_margin * body_.layout.cell;
     const Box wide{box.low + moved - margin, box.high + moved + margin};
-    near_.clear();
-    for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i)
-        if (wide.contains(current(body_.facets[i], displacement))) near_.push_back(i);
+    const std::vector<int> before = std::exchange(near_, {});
+    const bool some_only = steps_between_searches_ > 1;  // then friction has not followed the others
+    for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
+        const Vec2 x = current(body_.facets[i], displacement);
+        if (!wide.contains(x)) continue;
+        near_.push_back(i);
+        if (friction_ > 0.0 && some_only && !std::binary_search(before.begin(), before.end(), i)) place_[i] = x - moved;
+    }
+}
+
+Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) const {
+    const auto kept = std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
+    const bool is_kept = kept != grips_.end() && kept->place == touch.facet;
+    const Vec2& before = place_[touch.facet];
+    const double depth_before = is_kept ? 0.0 : std::min(0.0, signed_depth(shape_, before));
+    return drag({touch.normal, touch.curvature, touch.force, touch.stiffness, depth, depth_before, place - before}, friction_,
+                stiffness_[touch.facet], is_kept ? *kept : Grip{});
+}
+
+// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a force
+// that falls evenly [J].
+double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const {
+    double energy = 0.0;
+    auto touch = pushed_.begin();
+    for (const Grip& grip : grips_) {
+        while (touch != pushed_.end() && touch->facet < grip.place) ++touch;
+        if (touch != pushed_.end() && touch->facet == grip.place) continue;
+        const double held = stiffness_[grip.place] * grip.stretch;
+        energy += 0.5 * held * grip.stretch;
+        const Vec2 place = current(body_.facets[grip.place], displacement) - moved;
+        double depth = 0.0, curvature = 0.0;
+        Vec2 normal = Vec2::Zero();
+        if (!depth_in(shape_, place_[grip.place], depth, normal, curvature)) continue;
+        const double touched = depth / (depth - std::min(0.0, signed_depth(shape_, place)));  // share of the way
+        energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(normal));
+    }
+    return energy;
+}
+
+void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacement) {
+    if (friction_ == 0.0) return;
+    dissipated_ += std::exchange(sliding_now_, 0.0);
+    grips_.clear();
+    for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
+    const auto keep = [&](int i) { place_[i] = current(body_.facets[i], displacement) - moved; };
+    if (steps_between_searches_ > 1) std::for_each(near_.begin(), near_.end(), keep);
+    else for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
+}
+
+void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement) {
+    if (friction_ == 0.0) return;
+    grips_ = grips;
+    dissipated_ = dissipated;
+    sliding_now_ = 0.0;
+    for (std::size_t i = 0; i < place_.size(); ++i) place_[i] = current(body_.facets[i], displacement) - moved;
 }
 
 double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
@@ -101,7 +164,7 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
     const double onset = onset_in_cells * body_.layout.cell.minCoeff();
     std::vector<Touch> found;
     for (const int i : near_) {
-        Touch touch{i, Vec2::Zero(), 0.0, 0.0, 0.0, 0.0};
+        Touch touch{i, Vec2::Zero(), 0.0, 0.0, 0.0, 0.0, {}};
         double depth = 0.0;
         const Vec2 x = current(body_.facets[i], displacement) - moved;
         if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) continue;
@@ -118,6 +181,7 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
             const double at_end = 2.0 * at_touch + (1.0 - at_touch) * 2.0 / 3.0 - 0.5 * (1.0 + at_touch) * (1.0 + at_touch);
             touch.energy = 0.5 * k * d * d + at_end * k * onset * onset;
         }
+        if (friction_ > 0.0) touch.drag = drag_on(touch, x, depth);
         found.push_back(touch);
     }
     return found;
@@ -126,13 +190,17 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
 Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
     Vec2 total = Vec2::Zero();
     stored_energy_ = 0.0;
-    for (const Touch& touch : touches(moved, displacement)) {
+    sliding_now_ = 0.0;
+    pushed_ = touches(moved, displacement);
+    for (const Touch& touch : pushed_) {
         const Facet& facet = body_.facets[touch.facet];
-        const Vec2 push = touch.force * touch.normal;
+        const Vec2 push = touch.force * touch.normal + touch.drag.force;
         for (int k = 0; k < 4; ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
         total += push;
-        stored_energy_ += touch.energy;
+        stored_energy_ += touch.energy + touch.drag.energy;
+        sliding_now_ += touch.drag.dissipated;
     }
+    if (friction_ > 0.0) sliding_now_ += taken_off(moved, displacement);
     return total;
 }
 

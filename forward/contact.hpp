@@ -1,16 +1,18 @@
 #pragma once
 
 #include "forward/discretisation.hpp"
+#include "forward/friction.hpp"
 
 #include <vector>
 
 namespace crampfit {
 
-/// A rigid body that pushes on the specimen's outline without friction. Each facet inside it is pushed out along the body's
-/// normal by a force that grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls.
+/// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
+/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each facet
+/// that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
 class SlidingBody {
   public:
-    SlidingBody(const Shape& shape, const Discretisation& body);
+    SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
 
     /// Softens the springs so that they add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields
     /// of these masses [kg]. From then on the facets that the body may touch are searched for now and then only.
@@ -27,18 +29,29 @@ class SlidingBody {
         double force;      // along the normal [N]
         double stiffness;  // force per depth [N/m]
         double energy;     // [J]
+        Drag drag;         // of friction
     };
 
     /// All facets that the body, gone so far, pushes on.
     std::vector<Touch> touches(const Vec2& moved, const std::vector<Vec2>& displacement);
 
-    double stored_energy() const { return stored_energy_; }  // in the contact's springs [J]
+    double stored_energy() const { return stored_energy_; }  // in the contact's springs at the last push [J]
+    double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
+
+    /// Keeps the last push as what friction counts from.
+    void settle(const Vec2& moved, const std::vector<Vec2>& displacement);
+
+    /// What it has kept, and coming back to that: where the body and the wood were then, and what had been dissipated.
+    const std::vector<Grip>& grips() const { return grips_; }
+    void restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement);
 
     /// Deepest that any facet lies in the body where it stands [m].
     double deepest(const std::vector<Vec2>& displacement) const;
 
   private:
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
+    double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
+    Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
     Vec2 current(const Facet& facet, const std::vector<Vec2>& displacement) const;
 
     Shape shape_;
@@ -48,6 +61,14 @@ class SlidingBody {
     int age_ = 0;
     int steps_between_searches_ = 1;
     double stored_energy_ = 0.0;
+
+    // Friction:
+    double friction_;                // coefficient; 0: none, and nothing below is there
+    std::vector<Vec2> place_;        // [facets] against the body when it was kept [m]
+    std::vector<Grip> grips_;        // of the facets that touched then, by facet
+    std::vector<Touch> pushed_;      // the last push
+    double dissipated_ = 0.0;        // until then [J]
+    double sliding_now_ = 0.0;       // by the last push since then [J]
 };
 
 } // namespace crampfit

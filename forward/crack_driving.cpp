@@ -29,6 +29,7 @@ LoadState weighted(const std::vector<const LoadState*>& states, const std::vecto
         sum.potential += w * s.potential;
         sum.power += w * s.power;
         sum.traction_work += w * s.traction_work;
+        sum.dissipated += w * s.dissipated;
         sum.displacement += w * s.displacement;
         for (std::size_t d = 0; d < sum.reactions.size(); ++d) sum.reactions[d] += w * s.reactions[d];
         for (std::size_t k = 0; k < sum.tips.size(); ++k) {
@@ -135,6 +136,7 @@ void extrapolate(LoadState& fine, const LoadState& coarse) {
     improve(fine.potential, coarse.potential);
     improve(fine.power, coarse.power);
     improve(fine.traction_work, coarse.traction_work);
+    improve(fine.dissipated, coarse.dissipated);
     improve(fine.displacement, coarse.displacement);
     for (std::size_t d = 0; d < fine.reactions.size(); ++d) improve(fine.reactions[d], coarse.reactions[d]);
 }

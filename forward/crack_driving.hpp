@@ -11,9 +11,10 @@ namespace crampfit {
 /// One equilibrium: one crack length at one time of the loading.
 struct LoadState {
     double time = 0;                // [s]
-    double potential = 0;           // Pi: energy of the specimen less the work of tractions [J]
+    double potential = 0;           // Pi: energy of the specimen less the work of tractions, and what friction has dissipated [J]
     double power = 0;               // dPi/dt while the crack stands: of what prescribes motion [W]
-    double traction_work = 0;       // of tractions since there was no load [J]
+    double traction_work = 0;       // of tractions and forces on bodies since there was no load [J]
+    double dissipated = 0;          // by friction [J]
     double displacement = 0;        // of the measured edge or body [m]
     std::vector<Vec2> reactions;    // [drivers] [N]
     std::vector<TipLoad> tips;      // two a crack: start, end

@@ -1,5 +1,6 @@
 #include "forward/energy_release.hpp"
 
+#include "forward/face_pieces.hpp"
 #include "forward/near_tip_field.hpp"
 
 #include <Eigen/LU>
@@ -101,10 +102,14 @@ class Extension {
     Vec2 at(int node) const {
         const Layout& layout = body_.layout;
         const Vec2 x = layout.node_position(node);
-        const double distance = (x - line_.tip(at_end_).position).norm();
-        if (distance >= outer || on_outline(node)) return Vec2::Zero();
-        const double size = distance <= inner ? 1.0 : (outer - distance) / (outer - inner);
+        const double size = size_at(x);
+        if (size == 0.0 || on_outline(node)) return Vec2::Zero();
         return size * line_.direction_near(at_end_, x);
+    }
+
+    double size_at(const Vec2& x) const {
+        const double distance = (x - line_.tip(at_end_).position).norm();
+        return std::clamp((outer - distance) / (outer - inner), 0.0, 1.0);
     }
 
   private:
@@ -216,21 +221,40 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
     return Polar(sum / count).turn;
 }
 
-// On the left of the crack, seen toward the tip.
+// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the
+// middle.
+double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end,
+                      const Extension& extension, const std::vector<Vec2>& displacement, double thickness) {
+    const CrackLine& line = cracks.lines[crack];
+    double sum = 0.0;
+    for (const FacePiece& piece : pieces) {
+        const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
+        if (size == 0.0 || piece.far <= piece.near) continue;
+        const auto jump = [&](double behind) {
+            return Vec2((at_end ? 1.0 : -1.0) * cracks.opening(crack, line.behind(at_end, behind), displacement));
+        };
+        const Vec2 at_near = piece.near > 0.0 ? jump(piece.near) : Vec2(Vec2::Zero());
+        sum += piece.force.dot(at_near - jump(piece.far)) / (piece.far - piece.near) * size;
+    }
+    return -sum / thickness;
+}
+
+// On the left of the crack, seen toward the tip. What lies on it counts as left of the way from start to end, as its fields do.
 bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
     for (std::size_t k = 0; k + 1 < line.points.size(); ++k) {
         const Vec2 along = line.points[k + 1] - line.points[k];
         const Vec2 arm = x - line.points[k] - nearest_on_segment(line.points[k], line.points[k + 1], x) * along;
-        const double here = (at_end ? 1.0 : -1.0) * cross(along.normalized(), arm);
+        const double here = cross(along.normalized(), arm);
         const double distance = arm.norm();
         // Nearest to a corner: the segment that x stands off farther knows the side.
         const bool as_near = distance < nearest * (1.0 + 1e-9);
         if (distance < nearest * (1.0 - 1e-9) || (as_near && std::abs(here) > std::abs(side))) side = here;
         nearest = std::min(nearest, distance);
     }
-    return side > 0.0;
+    const double rounding = 1e-10 * line.length;
+    return at_end == (side >= -rounding);
 }
 
 // Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi on
@@ -286,10 +310,10 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // with a, t the near-tip displacement and stress of unit K in wood of compliance S, that at the tip; G = K^T H K gives
 // K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen
 // from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
-// Left out: tractions on closed faces, the speed of a running tip in a and t, and the traction that t puts on the faces of a crack
-// that bends within the domain.
+// Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2.
+// Left out: the speed of a running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
 Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
-                       const Extension& extension, const NodalState& nodal, bool rotates) {
+                       const Extension& extension, const NodalState& nodal, const std::vector<FacePiece>& pieces, bool rotates) {
     const Points& points = body.points;
     const CrackTip& tip = line.tip(at_end);
     const Mat2 turn = mean_turn(body, tip.position, extension, nodal);
@@ -320,6 +344,15 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
             sum[mode] += integrand * points.volume[p];
         }
     });
+    const auto left = field.at(1.0, std::numbers::pi), right = field.at(1.0, -std::numbers::pi);
+    for (const FacePiece& piece : pieces) {
+        const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
+        if (size == 0.0) continue;
+        const Vec2 force = (turn * axes).transpose() * piece.force;
+        const double mean_root = 2.0 / (std::sqrt(piece.near) + std::sqrt(piece.far));  // of r^-1/2 along the piece
+        for (int mode = 0; mode < 2; ++mode)
+            sum[mode] -= force.dot(left[mode].gradient.col(0) - right[mode].gradient.col(0)) * mean_root * size;
+    }
     return 0.5 / body.layout.thickness * field.release().inverse() * sum;
 }
 
@@ -345,12 +378,15 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     TipLoad load;
     load.toughness = wood.toughness;
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
-    load.G = J.G;
+    const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
+    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, body.layout.thickness);
     load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
-    const Vec2 K = intensity_factors(body, line, at_end, field, anywhere, state, options.rotates);
-    load.K_I = std::max(0.0, K[0]);  // faces that touch carry no mode I
+    const Vec2 K = intensity_factors(body, line, at_end, field, anywhere, state, pieces, options.rotates);
+    // Faces that press on each other next to the tip leave no mode I.
+    const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) { return piece.near < 2.0 * h; });
+    load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];
     // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: it
     // holds across boundaries, with a domain that is as wide as elsewhere. With the tip 4 cells off a boundary J, whose domain is then

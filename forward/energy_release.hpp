@@ -3,6 +3,8 @@
 #include "forward/cracks.hpp"
 #include "forward/deformation.hpp"
 
+#include <span>
+
 namespace crampfit {
 
 /// Fields at the grid's nodes, one entry a field of CrackFields.
@@ -10,6 +12,7 @@ struct NodalState {
     const std::vector<Vec2>& displacement;  // [m]
     const std::vector<Vec2>& velocity;      // [m/s]
     const std::vector<Vec2>& acceleration;  // [m/s^2]
+    std::span<const Vec2> faces = {};       // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
 };
 
 struct TipLoad {
@@ -35,8 +38,10 @@ struct EnergyReleaseOptions {
 /// Energy release rate of one tip: the energy that the body gives up when a patch of the grid moves on with the tip while the
 /// wood stays where it is. In domain form (Nakamura, Shih and Freund 1985, eq. 8, with the inhomogeneity term of Eischen 1987
 /// and a virtual extension q that follows the crack):
-///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA,
-/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress. K_I and K_II come from the
+///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA
+///         - int t_i [u_i],k q_k ds,
+/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces that touch
+/// and [u] the jump from right to left: what friction takes of the energy does not reach the tip. K_I and K_II come from the
 /// interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left, seen toward the tip, ahead, and
 /// turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree within the discretisation error,
 /// K's is the smaller one where the crack is oblique to the grid or boundaries are near (`tips_test`).

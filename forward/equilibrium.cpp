@@ -42,13 +42,14 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
-        sliding_.emplace_back(scene.bodies[b].shape, body);
+        sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
     }
     displacement_.assign(cracks_.fields(), Vec2::Zero());
     double stiffest = 0.0;
     for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
     least_force_ = least_strain * stiffest * body.layout.cell.maxCoeff() * body.layout.thickness;
+    find_free_bodies();
     renumber();
     find_forces();
 }
@@ -57,7 +58,13 @@ void Equilibrium::renumber() {
     const int fields = cracks_.fields();
     mass_ = field_masses(body_, fields);
     equation_.assign(2 * fields, 0);
-    for (const Boundary::Held& held : boundary_.held) equation_[2 * held.field + held.axis] = -1;
+    free_of_dof_.assign(2 * fields, -1);
+    for (const Boundary::Held& held : boundary_.held) {
+        const int dof = 2 * held.field + held.axis;
+        equation_[dof] = -1;
+        for (std::size_t k = 0; k < free_.size(); ++k)
+            if (free_[k].driver == held.driver && free_[k].axis == held.axis) free_of_dof_[dof] = static_cast<int>(k);
+    }
     for (const int dof : pieces_.holds) equation_[dof] = -1;
     std::vector<int> count(body_.layout.nodes(), 0);
     for (int dof = 0; dof < 2 * fields; ++dof) {
@@ -81,6 +88,8 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     const Box changed = cracks_.window(cracks_.lines[crack].tip(at_end).position, to);
     const auto fields = cracks_.grow(crack, at_end, to);
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
+    for (const auto& [added, from] : fields)
+        if (!settled_.empty()) settled_.push_back(settled_[from]);
     boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
     // A tip that ends may cut a piece free; where bodies slide, contact decides what can move.
@@ -108,14 +117,16 @@ void Equilibrium::find_forces() {
     force_.assign(displacement_.size(), Vec2::Zero());
     reaction_.assign(boundary_.drivers(), Vec2::Zero());
     internal_force_.add(displacement_, force_);
-    face_energy_ = 0.0;
-    for (const FieldPair& pair : cracks_.pairs) {
+    face_energy_ = face_dissipated_;
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
         if (mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) continue;
         const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
-        const Vec2 pull = pair_stiffness(pair) * jump;
+        const Drag drag = face_drag(k);
+        const Vec2 pull = pair_stiffness(pair) * jump - drag.force;
         force_[pair.left] -= pull;
         force_[pair.right] += pull;
-        face_energy_ += 0.5 * jump.dot(face_stiffness(pair) * jump);
+        face_energy_ += 0.5 * jump.dot(face_stiffness(pair) * jump) + drag.energy + drag.dissipated;
     }
     for (const Boundary::Traction& t : boundary_.tractions) {
         for (int k = 0; k < 4; ++k) force_[body_.points.node[t.facet.point][k]] += t.facet.weight[k] * t.force;
@@ -124,8 +135,8 @@ void Equilibrium::find_forces() {
     contact_energy_ = 0.0;
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        reaction_[driver] = sliding_[i].push(boundary_.travel(driver, time_), displacement_, force_);
-        contact_energy_ += sliding_[i].stored_energy();
+        reaction_[driver] = sliding_[i].push(place_of(driver), displacement_, force_);
+        contact_energy_ += sliding_[i].stored_energy() + sliding_[i].dissipated();
     }
     for (const Boundary::Held& held : boundary_.held)
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
@@ -137,21 +148,36 @@ GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const
     return made;
 }
 
-// What prescribed components still have to go loads the others.
-void Equilibrium::add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
-    for (int b = 0; b < 8; ++b) {
-        const double step = fields[b / 2] < 0 ? 0.0 : prescribed_step_[2 * fields[b / 2] + b % 2];
-        if (step == 0.0) continue;
-        for (int a = 0; a < 8; ++a) {
-            const int row = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
-            if (row >= 0) step_load_[row] -= stiffness(a, b) * step;
+// Of a stiffness, what prescribed components put on the equations as they go on, and what free bodies do.
+void Equilibrium::couple(std::span<const int> rows, std::span<const double> steps,
+                         const Eigen::Ref<const Eigen::MatrixXd>& stiffness) {
+    for (std::size_t b = 0; b < rows.size(); ++b) {
+        const int free = rows[b] - equations_;
+        if (rows[b] >= 0 ? free < 0 : steps[b] == 0.0) continue;
+        for (std::size_t a = 0; a < rows.size(); ++a) {
+            if (rows[a] < 0) continue;
+            if (rows[b] < 0) step_load_[rows[a]] -= stiffness(a, b) * steps[b];
+            else if (rows[a] < equations_) free_load_(rows[a], free) -= stiffness(a, b);
+            else free_stiffness_(rows[a] - equations_, free) += stiffness(a, b);
         }
     }
 }
 
+// The same of what joins up to four fields.
+void Equilibrium::couple_fields(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    std::array<int, 8> rows;
+    std::array<double, 8> steps;
+    for (int a = 0; a < 8; ++a) {
+        const int dof = 2 * fields[a / 2] + a % 2;
+        rows[a] = fields[a / 2] < 0 ? -1 : row_of(dof);
+        steps[a] = fields[a / 2] < 0 ? 0.0 : prescribed_step_[dof];
+    }
+    couple(rows, steps, stiffness);
+}
+
 void Equilibrium::add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
     extra_.emplace(cell, element(fields, stiffness));
-    add_step_load(fields, stiffness);
+    couple_fields(fields, stiffness);
 }
 
 // Points of a cell that follow each other on the same fields go together.
@@ -167,14 +193,16 @@ void Equilibrium::for_groups_of(int c, const Visit& visit) const {
     }
 }
 
-// What prescribed components that still have to go put on the points' cells.
-void Equilibrium::add_step_loads(bool geometric) {
-    const auto goes = [&](int f) { return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0; };
-    if (std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; })) return;
+// The same of the points.
+void Equilibrium::couple_points(bool geometric) {
+    if (free_.empty() && std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; })) return;
+    const auto goes = [&](int f) {
+        return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 || free_of_dof_[2 * f + 1] >= 0;
+    };
     for (int c = 0; c < body_.layout.cells(); ++c)
         for_groups_of(c, [&](const std::array<int, 4>& fields, int first, int count) {
             if (std::any_of(fields.begin(), fields.end(), goes))
-                add_step_load(fields, internal_force_.tangent(first, count, displacement_, geometric));
+                couple_fields(fields, internal_force_.tangent(first, count, displacement_, geometric));
         });
 }
 
@@ -186,7 +214,13 @@ void Equilibrium::add_pairs() {
         const int i = std::min(pair.node % (layout.cells_x + 1), layout.cells_x - 1);
         const int j = std::min(pair.node / (layout.cells_x + 1), layout.cells_y - 1);
         const int cell = layout.cell_index(i, j);
-        const Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
+        Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
+        if (const Drag drag = face_drag(k); drag.limit > 0.0) {
+            const Vec2 along = left_of(pair.normal);
+            const Mat2 symmetric = drag.stiffness * along * along.transpose();
+            stiffness += symmetric;
+            add_rubbing({pair.left, pair.right, -1, -1}, {1.0, -1.0, 0.0, 0.0}, -1, drag.tangent - symmetric);
+        }
         if (std::exchange(pair_stiffness_[k], stiffness) != stiffness) factor_.mark(cell);
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
@@ -207,38 +241,53 @@ void Equilibrium::add_lone_points() {
 
 void Equilibrium::add_touches(bool geometric) {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
-        const Vec2 gone = boundary_.travel(sliding_driver_[i], time_);
-        const Vec2& still_to_go = still_to_go_[sliding_driver_[i]];
-        for (const SlidingBody::Touch& touch : sliding_[i].touches(gone, displacement_)) {
+        const int driver = sliding_driver_[i];
+        for (const SlidingBody::Touch& touch : sliding_[i].touches(place_of(driver), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const std::array<int, 4>& fields = body_.points.node[facet.point];
-            const Mat2 along = touch.normal * touch.normal.transpose();
+            const Mat2 normal = touch.normal * touch.normal.transpose();
+            const Mat2 along = Mat2::Identity() - normal;
             const double turning = geometric ? touch.force * touch.curvature : 0.0;
-            const Mat2 stiffness = touch.stiffness * along - turning * (Mat2::Identity() - along);
+            const Mat2 stiffness = touch.stiffness * normal + (touch.drag.stiffness - turning) * along;
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
             add_extra(body_.points.cell[facet.point], fields, tangent);
-            const Vec2 push = stiffness * still_to_go;  // that the body's way adds, if what it touches stays the same
-            for (int k = 0; k < 4; ++k)
-                for (int axis = 0; axis < 2; ++axis) {
-                    const int row = equation_[2 * fields[k] + axis];
-                    if (row >= 0) step_load_[row] += facet.weight[k] * push[axis];
-                }
+            if (touch.drag.limit > 0.0) add_rubbing(fields, facet.weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
+            // The other end of the spring is the body.
+            std::array<int, 10> rows;
+            std::array<double, 10> steps{};
+            Eigen::Matrix<double, 10, 10> rest = Eigen::Matrix<double, 10, 10>::Zero();
+            for (int a = 0; a < 8; ++a) {
+                rows[a] = row_of(2 * fields[a / 2] + a % 2);
+                steps[a] = prescribed_step_[2 * fields[a / 2] + a % 2];
+                rest.block<1, 2>(a, 8) = -facet.weight[a / 2] * stiffness.row(a % 2);
+            }
+            rest.block<2, 8>(8, 0) = rest.block<8, 2>(0, 8).transpose();
+            rest.block<2, 2>(8, 8) = stiffness;
+            for (int axis = 0; axis < 2; ++axis) {
+                rows[8 + axis] = row_of_body(driver, axis);
+                steps[8 + axis] = still_to_go_[driver][axis];
+            }
+            couple(rows, steps, rest);
         }
     }
 }
 
 // In a linear scene only what a growing crack has changed is factored anew.
 bool Equilibrium::factor_tangent(bool geometric) {
-    if (!plan_.linear) factor_.mark_all();
-    step_load_.setZero(equations_);
+    if (!plan_.linear || !free_.empty()) factor_.mark_all();
+    const int free = static_cast<int>(free_.size());
+    step_load_.setZero(equations_ + free);
+    free_load_.setZero(equations_, free);
+    free_stiffness_.setZero(free, free);
+    rubbing_.clear();
     extra_.clear();
     lessons_.clear();
     add_lone_points();
     add_pairs();
     add_touches(geometric);
-    add_step_loads(geometric);
+    couple_points(geometric);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
         for_groups_of(cell, [&](const std::array<int, 4>& fields, int first_point, int count) {
@@ -247,22 +296,16 @@ bool Equilibrium::factor_tangent(bool geometric) {
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
     };
-    return factor_.factor(assemble) && factor_.reciprocal_condition() > least_reciprocal_condition;
+    return factor_.factor(assemble) && factor_.reciprocal_condition() > least_reciprocal_condition && border_tangent();
 }
 
-double Equilibrium::largest_residual() const {
-    double largest = 0.0;
-    for (std::size_t f = 0; f < force_.size(); ++f)
-        for (int axis = 0; axis < 2; ++axis)
-            if (equation_[2 * f + axis] >= 0) largest = std::max(largest, std::abs(force_[f][axis]));
-    return largest;
-}
+double Equilibrium::largest_residual() const { return out_of_balance().lpNorm<Eigen::Infinity>(); }
 
 void Equilibrium::prescribe(double time) {
     prescribed_step_.assign(equation_.size(), 0.0);
     for (const Boundary::Held& held : boundary_.held)
         prescribed_step_[2 * held.field + held.axis] =
-            boundary_.travel(held.driver, time)[held.axis] - displacement_[held.field][held.axis];
+            (boundary_.travel(held.driver, time) + moved_[held.driver])[held.axis] - displacement_[held.field][held.axis];
     still_to_go_.resize(boundary_.drivers());
     for (int d = 0; d < boundary_.drivers(); ++d) still_to_go_[d] = boundary_.travel(d, time) - boundary_.travel(d, time_);
     next_time_ = time;
@@ -277,16 +320,12 @@ void Equilibrium::move_prescribed() {
 }
 
 // Slope of the potential along a step of the equations' unknowns [J].
-double Equilibrium::slope_along(const Eigen::VectorXd& step) const {
-    double slope = 0.0;
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) slope -= force_[dof / 2][dof % 2] * step[equation_[dof]];
-    return slope;
-}
+double Equilibrium::slope_along(const Eigen::VectorXd& step) const { return -out_of_balance().dot(step); }
 
 void Equilibrium::move(const Eigen::VectorXd& step, double share) {
+    for (std::size_t k = 0; k < free_.size(); ++k) moved_[free_[k].driver][free_[k].axis] += share * step[equations_ + static_cast<int>(k)];
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) displacement_[dof / 2][dof % 2] += share * step[equation_[dof]];
+        if (const int row = row_of(static_cast<int>(dof)); row >= 0) displacement_[dof / 2][dof % 2] += share * step[row];
 }
 
 // A full Newton step, or less of it where contact changes so much on the way that the potential has long been rising again.
@@ -311,28 +350,22 @@ double Equilibrium::take_step(const Eigen::VectorXd& step) {
     return gone;
 }
 
-Eigen::VectorXd Equilibrium::forces_on_equations() const {
-    Eigen::VectorXd forces(equations_);
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) forces[equation_[dof]] = force_[dof / 2][dof % 2];
-    return forces;
-}
-
 // The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes few
 // directions, which a few steps tell.
-Eigen::VectorXd Equilibrium::newton_step(Eigen::MatrixXd load) const {
+Eigen::VectorXd Equilibrium::newton_step(Eigen::VectorXd load) const {
     std::vector<double> share(lessons_.size());
     for (std::size_t k = lessons_.size(); k-- > 0;) {
-        share[k] = lessons_[k].step.dot(load.col(0)) / lessons_[k].work;
-        load.col(0) -= share[k] * lessons_[k].force;
+        share[k] = lessons_[k].step.dot(load) / lessons_[k].work;
+        load -= share[k] * lessons_[k].force;
     }
-    factor_.solve(load);
+    Eigen::VectorXd step = tangent_step(load);
     for (std::size_t k = 0; k < lessons_.size(); ++k)
-        load.col(0) += (share[k] - lessons_[k].force.dot(load.col(0)) / lessons_[k].work) * lessons_[k].step;
-    return load.col(0);
+        step += (share[k] - lessons_[k].force.dot(step) / lessons_[k].work) * lessons_[k].step;
+    return step;
 }
 
 void Equilibrium::learn(Eigen::VectorXd step, Eigen::VectorXd force) {
+    if (!rubbing_.empty()) return;  // the tangent is not symmetric
     const double work = step.dot(force);
     if (work > 1e-8 * step.norm() * force.norm()) lessons_.push_back({std::move(step), std::move(force), work});
 }
@@ -352,7 +385,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             find_forces();
             if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         }
-        const Eigen::VectorXd start = forces_on_equations();
+        const Eigen::VectorXd start = out_of_balance();
         const Eigen::VectorXd step = newton_step(start + step_load_);
         step_load_.setZero();
         const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
@@ -362,13 +395,16 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             find_forces();
         } else {
             const double share = take_step(step);
-            learn(share * step, start - forces_on_equations());
+            learn(share * step, start - out_of_balance());
         }
         double scale = least_force_;
         for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
-        if (residual <= balance * scale) return Outcome::solved;
+        if (residual <= balance * scale) {
+            settle();
+            return Outcome::solved;
+        }
         renew = residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
@@ -386,13 +422,15 @@ double Equilibrium::traction_work() const {
     for (const Boundary::Traction& t : boundary_.tractions)
         for (int k = 0; k < 4; ++k)
             work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+    for (const Free& free : free_) work += free.force * moved_[free.driver][free.axis];
     return work;
 }
 
 double Equilibrium::potential() const { return strain_energy() + contact_energy_ + face_energy_ - traction_work(); }
 
 double Equilibrium::measured_displacement(double time) const {
-    return boundary_.moved(gauges_.displacement, time, displacement_).dot(gauges_.displacement_direction);
+    const Vec2 moved = boundary_.moved(gauges_.displacement, time, displacement_) + moved_[gauges_.displacement];
+    return moved.dot(gauges_.displacement_direction);
 }
 
 double Equilibrium::power() const {
@@ -406,7 +444,7 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
     const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
-    return tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still}, options);
+    return tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, face_forces()}, options);
 }
 
 // Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
@@ -421,7 +459,7 @@ void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
     }
 }
 
-Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_}; }
+Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()}; }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
@@ -430,15 +468,17 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     pieces_ = snapshot.pieces;
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;
+    set_contacts(snapshot.contacts);
     internal_force_.sort_cells();
     renumber();
     mark_changes(before);
     find_forces();
 }
 
-void Equilibrium::set_displacements(const std::vector<Vec2>& displacement, double time) {
+void Equilibrium::set_displacements(const std::vector<Vec2>& displacement, double time, const Contacts& contacts) {
     displacement_ = displacement;
     time_ = next_time_ = time;
+    set_contacts(contacts);
     find_forces();
 }
 

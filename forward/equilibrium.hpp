@@ -10,13 +10,18 @@
 #include "forward/plan.hpp"
 
 #include <map>
+#include <span>
 #include <vector>
 
 namespace crampfit {
 
 /// Static equilibrium of points, grid, crack fields and bodies for given crack tips: the displacement that makes the potential
-///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions
-/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent.
+///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions and forces on bodies
+/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or closed
+/// crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi holds what
+/// friction has dissipated, so that its change is still the work of what prescribes motion.
+///
+/// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
   public:
     /// Equations are solved by `threads` threads, with the same bits whatever their number.
@@ -38,7 +43,8 @@ class Equilibrium {
 
     double potential() const;                      // Pi [J]
     double strain_energy() const;                  // in the points and in the ties [J]
-    double traction_work() const;                  // traction times displacement [J]
+    double traction_work() const;                  // of tractions and forces on bodies, times displacement [J]
+    double dissipated() const;                     // by friction so far [J]
     double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
@@ -76,6 +82,16 @@ class Equilibrium {
     /// The derivative of G at a tip by a number, with that of the displacements [J/m^2 / unit].
     double release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope);
 
+    /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what friction
+    /// remembers. Empty: as it was at the start.
+    struct Contacts {
+        std::vector<Vec2> moved;                // [drivers] [m]
+        std::vector<std::vector<Grip>> bodies;  // [bodies that push]
+        std::vector<Grip> faces;                // [pairs]
+        std::vector<double> dissipated;         // by each of those bodies, and by all crack faces [J]
+    };
+    Contacts contacts() const;
+
     /// Everything that growth and solution change, to come back to.
     struct Snapshot {
         CrackFields cracks;
@@ -84,10 +100,11 @@ class Equilibrium {
         LoosePieces pieces;
         std::vector<Vec2> displacement;
         double time;
+        Contacts contacts = {};
     };
     Snapshot save() const;
     void restore(const Snapshot& snapshot);
-    void set_displacements(const std::vector<Vec2>& displacement, double time);
+    void set_displacements(const std::vector<Vec2>& displacement, double time, const Contacts& contacts = {});
 
   private:
     TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
@@ -96,24 +113,39 @@ class Equilibrium {
     void find_forces();
     bool factor_tangent(bool geometric);
     GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
-    void add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
-    void add_step_loads(bool geometric);
+    void couple_fields(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    void couple_points(bool geometric);
     void add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     template <class Visit>
     void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
     void add_pairs();
     void add_touches(bool geometric);
+    void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
+    void add_rubbing(const std::array<int, 4>& fields, const std::array<double, 4>& weight, int driver, const Mat2& remainder);
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
+    Vec2 place_of(int driver) const { return boundary_.travel(driver, time_) + moved_[driver]; }  // how far it has come [m]
+    Drag face_drag(std::size_t pair) const;
+    std::vector<Vec2> face_forces() const;
+    void find_free_bodies();
+    void seat(int sliding);
+    void settle();
+    void set_contacts(const Contacts& contacts);
+    bool border_tangent();
+    int row_of(int dof) const { return equation_[dof] >= 0 || free_of_dof_[dof] < 0 ? equation_[dof] : equations_ + free_of_dof_[dof]; }
+    int row_of_body(int driver, int axis) const;
+    Eigen::VectorXd out_of_balance() const;
+    Eigen::VectorXd bordered_step(const Eigen::VectorXd& right) const;
+    Eigen::VectorXd remainder_of(const Eigen::VectorXd& step) const;
+    Eigen::VectorXd tangent_step(const Eigen::VectorXd& right) const;
     double largest_residual() const;
     double slope_along(const Eigen::VectorXd& step) const;
     void move(const Eigen::VectorXd& step, double share);
     double take_step(const Eigen::VectorXd& step);
-    Eigen::VectorXd forces_on_equations() const;  // out of balance [N]
-    Eigen::VectorXd newton_step(Eigen::MatrixXd load) const;
+    Eigen::VectorXd newton_step(Eigen::VectorXd load) const;
     void learn(Eigen::VectorXd step, Eigen::VectorXd force);
     void prescribe(double time);
     void move_prescribed();
@@ -149,7 +181,7 @@ class Equilibrium {
     std::vector<Mat2> pair_stiffness_;  // [pairs] as last factored [N/m]
     std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
     std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
-    Eigen::VectorXd step_load_;       // what that puts on the equations [N]
+    Eigen::VectorXd step_load_;       // what that puts on the equations and the free bodies [N]
     int factorisations_ = 0;
     struct Lesson {
         Eigen::VectorXd step;         // that was taken [m]
@@ -157,6 +189,32 @@ class Equilibrium {
         double work;                  // their product [J]
     };
     std::vector<Lesson> lessons_;     // since the tangent was factored
+
+    // Bodies that follow a force:
+    struct Free {
+        int driver, axis;
+        double force;                 // on the body [N]
+    };
+    std::vector<Free> free_;          // its equations come after the grid's
+    std::vector<int> free_of_dof_;    // [2 x fields] the free one that holds it, or -1
+    std::vector<Vec2> moved_;         // [drivers] beyond what is prescribed [m]
+    std::vector<Vec2> seat_;          // [drivers] the same at the start
+    Eigen::MatrixXd free_load_;       // [equations x free] what their unit motions put on the grid [N/m]
+    Eigen::MatrixXd free_stiffness_;  // [free x free] and on themselves [N/m]
+    Eigen::MatrixXd free_motion_;     // [equations x free] how the grid follows them
+    Eigen::MatrixXd free_yield_;      // [free x free] how they yield to forces [m/N]
+
+    // Friction:
+    struct Rubbing {                  // what the factor leaves out of the tangent at a place that rubs: it is not symmetric
+        std::array<int, 4> fields;
+        std::array<double, 4> weight;
+        int driver;                   // of the body, or -1
+        Mat2 remainder;               // force on the fields less that on the body by their motion against it, with sign [N/m]
+    };
+    std::vector<Rubbing> rubbing_;
+    std::vector<Vec2> settled_;       // displacement from which friction on crack faces counts; empty: no such faces
+    std::vector<Grip> face_grips_;    // [pairs, or fewer: the others have not slid yet]
+    double face_dissipated_ = 0;      // until then [J]
 };
 
 } // namespace crampfit

@@ -42,7 +42,7 @@ Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     still_to_go_ = drivers;
     step_load_.setZero(equations_);
     extra_.clear();
-    add_step_loads(true);
+    couple_points(true);
     add_lone_points();
     add_pairs();
     add_touches(true);
@@ -134,7 +134,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     }
     // So are bodies' springs.
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
-        for (const SlidingBody::Touch& touch : sliding_[s].touches(boundary_.travel(sliding_driver_[s], time_), displacement_)) {
+        for (const SlidingBody::Touch& touch : sliding_[s].touches(place_of(sliding_driver_[s]), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
             const int stiffest = points.stiffness[0][facet.point] >= points.stiffness[2][facet.point] ? 0 : 1;
             for (std::size_t n = 0; n < numbers.size(); ++n) {

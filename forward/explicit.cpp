@@ -64,6 +64,7 @@ void ExplicitSolver::surface_forces() {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
         reaction_[driver] = sliding_[i].push(moved(driver), displacement_, force_);
+        sliding_[i].settle(moved(driver), displacement_);
         books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver));
     }
 }
@@ -97,7 +98,9 @@ void ExplicitSolver::advance_velocities() {
 
 void ExplicitSolver::close_crack_faces() {
     const double dt = plan_.time_step;
-    for (const FieldPair& pair : cracks_.pairs) {
+    face_force_.assign(cracks_.pairs.size(), Vec2::Zero());
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
         const double m_left = mass_[pair.left];
         const double m_right = mass_[pair.right];
         if (m_left == 0.0 || m_right == 0.0) continue;
@@ -108,11 +111,17 @@ void ExplicitSolver::close_crack_faces() {
         const double too_fast = slowest - rate.dot(pair.normal);
         if (too_fast <= 0.0) continue;
         Vec2 change = too_fast * pair.normal;
-        if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) {
-            const Vec2 along = left_of(pair.normal);
-            change -= rate.dot(along) * along;
-        }
         const double total = m_left + m_right;
+        const CrackFaces& faces = scene_.cracks[pair.crack].faces;
+        const Vec2 along = left_of(pair.normal);
+        if (faces.kind == CrackFaces::Kind::stick) change -= rate.dot(along) * along;
+        if (faces.coefficient > 0.0) {  // Coulomb's law of impulses
+            const double most = faces.coefficient * too_fast;
+            change += std::clamp(-rate.dot(along), -most, most) * along;
+        }
+        const Vec2 rate_before = rate - dt * (acceleration_[pair.left] - acceleration_[pair.right]);
+        books_.damped -= m_left * m_right / total * change.dot(0.5 * (rate_before + rate + change));
+        face_force_[k] = m_left * m_right / total / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;
         acceleration_[pair.left] += m_right / total * change / dt;
@@ -143,7 +152,7 @@ void ExplicitSolver::advance_displacements() {
 TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
-    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_}, options);
+    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, face_force_}, options);
 }
 
 EnergyBooks ExplicitSolver::energies() const {
@@ -155,6 +164,7 @@ EnergyBooks ExplicitSolver::energies() const {
     for (std::size_t n = 0; n < mass_.size(); ++n)
         books.kinetic += 0.5 * mass_[n] * (velocity_[n] + 0.5 * plan_.time_step * acceleration_[n]).squaredNorm();
     for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
+    for (const SlidingBody& body : sliding_) books.damped += body.dissipated();
     return books;
 }
 

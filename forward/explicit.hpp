@@ -17,7 +17,7 @@ struct EnergyBooks {
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
     double fracture = 0;  // toughness times new crack area
-    double damped = 0;
+    double damped = 0;    // by drag, and by friction and impact of contacts
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
@@ -38,6 +38,7 @@ class ExplicitSolver {
     double time() const { return time_; }
     const CrackFields& cracks() const { return cracks_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
+    const std::vector<Vec2>& velocities() const { return velocity_; }  // half a step before
     const std::vector<TipLoad>& tip_loads() const { return tip_loads_; }  // latest, two a crack: start, end
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
@@ -78,6 +79,7 @@ class ExplicitSolver {
     std::vector<Vec2> force_;         // [N]
 
     std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
+    std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
     std::vector<TipLoad> tip_loads_;
     std::vector<double> last_growth_; // [two a crack] [s]
     double time_ = 0.0;

@@ -11,8 +11,8 @@ namespace crampfit {
 void ExplicitSolver::place_bodies() {
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Body& rigid = scene_.bodies[b];
-        if (rigid.contact.kind != Contact::Kind::frictionless) continue;
-        SlidingBody sliding(rigid.shape, body_);
+        if (rigid.contact.kind == Contact::Kind::bonded) continue;
+        SlidingBody sliding(rigid.shape, body_, rigid.contact.coefficient);
         sliding.limit_frequency(mass_, plan_.added_frequency_squared);
         const double depth = std::max(sliding.deepest(displacement_), 0.0);
         const bool swallows = std::any_of(body_.points.position.begin(), body_.points.position.end(),

@@ -19,10 +19,11 @@ class KeptWalk {
     /// Equations are solved by `threads` threads.
     explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {}, int threads = 1);
 
-    /// False where it is not reusable: derivatives are those on the way of the crack as it is.
-    bool has_slopes() const { return reusable_; }
+    /// False where it is not reusable, or where bodies follow a force: derivatives are those on the way of the crack as it is.
+    bool has_slopes() const { return reusable_ && !plan_.free_bodies; }
 
-    /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
+    /// False where toughness changes more than when the crack moves: in explicit dynamics, with several growing tips, or with
+    /// friction, where a state hangs on the way to it.
     bool reusable() const { return reusable_; }
 
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do

@@ -56,14 +56,11 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
         if (crack.direction == GrowthDirection::energy_release_rate && crack.grows != Growth::none && orthotropic)
             refuse(scene, key + ".direction", "energy release rate",
                    "not available in orthotropic wood, for whose branches no solution is built in; use \"hoop stress\", \"normal to opening\" or \"straight\"");
-        if (crack.faces.kind == CrackFaces::Kind::friction)
-            refuse(scene, key + ".faces", fmt::format("friction = {}", crack.faces.coefficient),
-                   "friction is not available in this version; use \"frictionless\" or \"stick\"");
     }
     for (const Body& body : scene.bodies)
-        if (body.contact.kind == Contact::Kind::friction)
-            refuse(scene, "bodies." + body.name + ".contact", fmt::format("friction = {}", body.contact.coefficient),
-                   "friction is not available in this version; use \"frictionless\" or \"bonded\"");
+        if (!quasistatic && (body.free[0] || body.free[1]))
+            refuse(scene, "bodies." + body.name + ".velocity", "free",
+                   "a body that follows a force has no mass to move with in explicit dynamics; use solver.kind = \"quasistatic\", or give its velocity");
 }
 
 // Highest squared frequency that any point can take part in: with the point as an element of its own, its stiffness over its
@@ -177,23 +174,30 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.driven = travel.fastest > 0.0;
     plan.still_from = travel.until;
     for (const Crack& crack : scene.cracks) plan.grows |= crack.grows != Growth::none;
+    for (const Crack& crack : scene.cracks) plan.friction |= crack.faces.coefficient > 0.0;
+    for (const Body& rigid : scene.bodies) {
+        plan.friction |= rigid.contact.coefficient > 0.0;
+        plan.free_bodies |= rigid.free[0] || rigid.free[1];
+    }
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && plan.slowness > slow_loading && scene.solver.damping == 0.0);
+                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 &&
+                        (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
 
     const double smallest = scene.specimen.size.minCoeff();
     const double motion = farthest_motion(scene, plan.end_time);
-    const bool slides = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                    [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
+    plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                               [](const Body& b) { return b.contact.kind != Contact::Kind::bonded; });
     // A crack under edges that are drawn apart crosses before they go much farther than it takes to split a plain strip.
     const double needed = plan.quasistatic && plan.grows && scene.bodies.empty() ? splitting_motion(scene, body) : motion;
     const double expected = std::min(motion, needed);
     plan.rotates = expected > most_rotation * smallest;
-    plan.linear = plan.quasistatic && !plan.rotates && !slides && travel.together;
+    plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && travel.together;
     if (plan.quasistatic && !plan.linear && plan.driven && !std::isfinite(plan.end_time))
         refuse(scene, "stop", "crack_length alone", "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
+        : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
@@ -233,10 +237,13 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         choose("growth", fmt::format("{} tips compete", tips),
                "the tip moves whose next advance pays for itself at the least load, tips that nothing tells apart together; which one "
                "depends on the toughness, so that each other toughness needs a run of its own");
-    plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                               [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
-    choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",
+    choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
+    if (plan.friction)
+        choose("friction", "Coulomb, of bodies or crack faces that press", plan.quasistatic
+               ? "slip counts from one equilibrium to the next; Newton's method takes its unsymmetric tangent by iteration on the symmetric part"
+               : "asked for");
+    if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;
 
     const double highest = highest_frequency_squared(body);

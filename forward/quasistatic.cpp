@@ -87,6 +87,7 @@ LoadState Quasistatic::load_state() const {
     state.potential = equilibrium_.potential();
     state.power = equilibrium_.power();
     state.traction_work = equilibrium_.traction_work();
+    state.dissipated = equilibrium_.dissipated();
     state.displacement = equilibrium_.measured_displacement(state.time);
     state.reactions = equilibrium_.reactions();
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
@@ -194,7 +195,7 @@ bool Quasistatic::know_linear(std::size_t number) {
         ++equilibria_;
         return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
     };
-    if (equilibrium_.boundary().tractions.empty()) {  // all goes with the load or its square
+    if (!equilibrium_.boundary().has_dead_load()) {  // all goes with the load or its square
         const bool good = solve(2);
         if (!good && !places_[number].station.left) return false;
         const LoadState full = good ? load_state() : nothing(time_of(2));
@@ -214,12 +215,16 @@ bool Quasistatic::know_linear(std::size_t number) {
     }
     if (!solve(0)) return false;
     const std::vector<Vec2> unloaded = equilibrium_.displacements();
+    const Equilibrium::Contacts before = equilibrium_.contacts();
     if (plan_.driven && !solve(2)) return false;
     const std::vector<Vec2> loaded = equilibrium_.displacements();
+    Equilibrium::Contacts between = equilibrium_.contacts();
+    const std::vector<Vec2> moved = between.moved;
     for (const int time : {0, 1, 2}) {
         std::vector<Vec2> u(unloaded.size());
         for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
-        equilibrium_.set_displacements(u, time_of(time));
+        for (std::size_t d = 0; d < moved.size(); ++d) between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
+        equilibrium_.set_displacements(u, time_of(time), between);
         keep(number, time, load_state());
         if (numbers_.empty()) continue;
         auto slopes = slopes_here();
@@ -254,6 +259,7 @@ std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& befo
 // From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
 // nearest of these has gone between the two times.
 bool Quasistatic::solve_predicted(std::size_t number, int time) {
+    if (plan_.friction || plan_.free_bodies) return false;  // more than the displacement tells such a state
     int before = places_[number].parent;
     for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back) before = back < farthest_back ? places_[before].parent : -1;
     if (before < 0) return false;
@@ -280,7 +286,7 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
     const auto consider = [&](const Known& known, bool before) {
-        if (std::abs(known.time - time) >= nearest) return;
+        if (std::abs(known.time - time) >= nearest || (plan_.friction && known.time > time)) return;  // friction: by loading alone
         nearest = std::abs(known.time - time);
         from = known;
         if (before) from.displacement = handed_on(place.parent, known.displacement, static_cast<int>(number));
@@ -290,7 +296,7 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
         for (const auto& [t, known] : places_[place.parent].known) consider(known, true);
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
-        equilibrium_.set_displacements(from.displacement, time_of(from.time));
+        equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
         double potential = from.potential;
         double power = from.power;
         bool good = true;
@@ -365,9 +371,9 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
     if (coarse_ && !coarse_->walk.know_slopes(number, time)) return false;
     std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));  // of what carries nothing
     const auto known = place.known.find(time);
-    if (known != place.known.end() && (time > 0 || !equilibrium_.boundary().tractions.empty())) {
+    if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
         enter(place);
-        equilibrium_.set_displacements(known->second.displacement, time_of(time));
+        equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
         auto here = slopes_here();
         if (!here) return false;
         slopes = std::move(*here);
@@ -380,14 +386,14 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
     if (coarse_ && !(coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time))) return false;
-    if (time == 0 && equilibrium_.boundary().tractions.empty()) {
+    if (time == 0 && !equilibrium_.boundary().has_dead_load()) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
         keep(number, 0, nothing(0.0));
         return true;
     }
     if (solve_for(number, time)) {
-        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
+        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
         return true;
     }

@@ -70,6 +70,7 @@ class Quasistatic {
         std::vector<Vec2> displacement;                 // [fields] [m]
         double potential;                               // [J]
         double power;                                   // [W]
+        Equilibrium::Contacts contacts = {};
     };
     struct GrowingTip {
         int crack;

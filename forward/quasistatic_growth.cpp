@@ -76,7 +76,7 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     const int time = time_from(now);
     if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
-    if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time));
+    if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
     std::vector<CrackFields::NewField> fields;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
         if (!(tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;

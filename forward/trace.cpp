@@ -30,6 +30,7 @@ LoadState mixed(const LoadState& a, const LoadState& b, double s) {
     blend(mix.potential, b.potential);
     blend(mix.power, b.power);
     blend(mix.traction_work, b.traction_work);
+    blend(mix.dissipated, b.dissipated);
     blend(mix.displacement, b.displacement);
     for (std::size_t d = 0; d < mix.reactions.size(); ++d) blend(mix.reactions[d], b.reactions[d]);
     for (std::size_t k = 0; k < mix.tips.size(); ++k) {
@@ -249,7 +250,8 @@ class Tracer {
             history.K_II.push_back(tip.K_II);
         }
         for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.push_back(m.load.reactions[d]);
-        row.strain_energy = m.load.potential + m.load.traction_work;
+        const double stored = m.load.potential + m.load.traction_work;  // and dissipated
+        row.strain_energy = stored - m.load.dissipated;
         row.fracture_energy = m.fracture_energy;
         if (!record_.series.empty()) {
             const Moment& before = last_;
@@ -258,10 +260,10 @@ class Tracer {
             row.external_work = record_.series.back().external_work + work;
             // A jump turns what it releases beyond the toughness into motion, which is not followed.
             if (!jumped)
-                imbalance_ += work - (row.strain_energy - before.load.potential - before.load.traction_work) -
+                imbalance_ += work - (stored - before.load.potential - before.load.traction_work) -
                               (m.fracture_energy - before.fracture_energy);
             largest_imbalance_ = std::max(largest_imbalance_, std::abs(imbalance_));
-            largest_energy_ = std::max({largest_energy_, std::abs(row.external_work), row.strain_energy});
+            largest_energy_ = std::max({largest_energy_, std::abs(row.external_work), stored});
         } else {
             row.external_work = m.load.traction_work;
         }

@@ -470,7 +470,34 @@ TEST(UnitScene, NotSupportedYet) {
         {ring_scene, "cell = \"0.1 mm\"", "error = \"2 mm\"", "model.error", ""},
         {ring_scene, "\"isotropic\"", "\"viscoelastic\"", "materials.EW.kind", "not supported yet"},
         {ring_scene, "\"isotropic\"", "\"plastic\"", "materials.EW.kind", "not supported yet"},
-        {ring_scene, "\"-1 mm/min\"", "\"free\"", "bodies.left wheel.velocity.1", "not supported yet"},
-        {ring_scene, "contact = \"bonded\"", "force = [\"0 N\", \"1 N\"]", "bodies.body 1.force", "not supported yet"},
+    });
+}
+
+TEST(UnitScene, ABodyMayFollowAForce) {
+    const std::string free = "velocity = [\"0 m/s\", \"-1 mm/min\"]";
+    std::string text = ring_scene;
+    text.replace(text.find(free), free.size(), "velocity = [\"2 mm/s\", \"free\"]\nforce = [\"0 N\", \"-3 N\"]");
+    Scene scene = SceneFolder().parse(text);
+    const Body& wheel = scene.bodies[0];
+    EXPECT_EQ(wheel.velocity, Vec2(2e-3, 0.0));
+    EXPECT_EQ(wheel.force, Vec2(0.0, -3.0));
+    EXPECT_FALSE(wheel.free[0]);
+    EXPECT_TRUE(wheel.free[1]);
+    // Its force and the friction are numbers that a fit may adjust, the free component is none.
+    set_number(scene, "bodies.left wheel.force.1", -4.0);
+    EXPECT_EQ(scene.bodies[0].force.y(), -4.0);
+    set_number(scene, "bodies.left wheel.contact.friction", 0.5);
+    EXPECT_EQ(scene.bodies[0].contact.coefficient, 0.5);
+    set_number(scene, "cracks.0.faces.friction", 0.6);
+    EXPECT_EQ(scene.cracks[0].faces.coefficient, 0.6);
+    EXPECT_THROW(set_number(scene, "bodies.left wheel.velocity.1", 1.0), InputError);
+    EXPECT_THROW(set_number(scene, "bodies.left wheel.force.0", 1.0), InputError);
+    EXPECT_THROW(set_number(scene, "bodies.body 1.contact.friction", 0.1), InputError);
+    EXPECT_THROW(set_number(scene, "cracks.1.faces.friction", 0.1), InputError);
+    expect_errors({
+        {ring_scene, "\"-1 mm/min\"", "\"free\"", "bodies.left wheel.velocity", "give force"},
+        {ring_scene, "contact = \"bonded\"", "force = [\"0 N\", \"1 N\"]", "bodies.body 1.force.1", "make it \"free\""},
+        {ring_scene, free, "velocity = [\"0 m/s\", \"free\"]\nforce = [\"0 N\"]", "bodies.left wheel.force", "two forces"},
+        {ring_scene, free, "velocity = [\"0 m/s\", \"free\"]\nforce = [\"0 N\", \"3\"]", "bodies.left wheel.force.1", ""},
     });
 }

@@ -1,0 +1,220 @@
+// Of equilibrium, what bodies that follow a force and friction add to it.
+#include "datasets/error.hpp"
+#include "forward/equilibrium.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+namespace {
+
+// A body that follows a force is looked for a place on the specimen in steps of this part of a cell.
+constexpr double seating_step = 0.25;
+constexpr int bisections = 50;
+
+// Motions of free bodies that meet less stiffness than this part of the largest meet none: no force goes with them.
+constexpr double no_stiffness = 1e-9;
+
+} // namespace
+
+void Equilibrium::find_free_bodies() {
+    moved_.assign(boundary_.drivers(), Vec2::Zero());
+    for (int b = 0; b < static_cast<int>(scene_.bodies.size()); ++b)
+        for (int axis = 0; axis < 2; ++axis)
+            if (scene_.bodies[b].free[axis]) free_.push_back({boundary_.first_body() + b, axis, scene_.bodies[b].force[axis]});
+    for (std::size_t i = 0; i < sliding_.size(); ++i) seat(static_cast<int>(i));
+    seat_ = moved_;
+    const auto rubs = [](const Crack& crack) { return crack.faces.coefficient > 0.0; };
+    if (std::any_of(scene_.cracks.begin(), scene_.cracks.end(), rubs)) settled_ = displacement_;
+}
+
+// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to begin
+// with.
+void Equilibrium::seat(int sliding) {
+    const int driver = sliding_driver_[sliding];
+    const Body& rigid = scene_.bodies[driver - boundary_.first_body()];
+    const double load = rigid.force.norm();
+    if (load == 0.0) return;
+    const Vec2 way = rigid.force / load;
+    const auto carries = [&](double gone) {
+        double force = 0.0;
+        for (const SlidingBody::Touch& touch : sliding_[sliding].touches(gone * way, displacement_))
+            force += touch.force * touch.normal.dot(way);
+        return force >= load;
+    };
+    const Box box = bounds(rigid.shape);
+    const Vec2 farthest = box.low.cwiseAbs() + box.high.cwiseAbs() + body_.layout.size();
+    const double step = seating_step * body_.layout.cell.minCoeff();
+    double high = 0.0;
+    while (!carries(high)) {
+        high += step;
+        if (high > farthest.norm())
+            throw InputError(scene_.file.string(), "bodies." + rigid.name + ".force",
+                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()), "the body meets nothing on this way that could carry the force");
+    }
+    double low = std::max(0.0, high - step);
+    for (int k = 0; k < bisections; ++k) (carries(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+    moved_[driver] = high * way;
+    sliding_[sliding].restore({}, 0.0, moved_[driver], displacement_);  // friction counts from there
+}
+
+int Equilibrium::row_of_body(int driver, int axis) const {
+    for (std::size_t k = 0; k < free_.size(); ++k)
+        if (free_[k].driver == driver && free_[k].axis == axis) return equations_ + static_cast<int>(k);
+    return -1;
+}
+
+// Forces on the equations' unknowns, those on free bodies last [N].
+Eigen::VectorXd Equilibrium::out_of_balance() const {
+    Eigen::VectorXd forces(equations_ + static_cast<int>(free_.size()));
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) forces[equation_[dof]] = force_[dof / 2][dof % 2];
+    for (std::size_t k = 0; k < free_.size(); ++k)
+        forces[equations_ + static_cast<int>(k)] = free_[k].force - reaction_[free_[k].driver][free_[k].axis];
+    return forces;
+}
+
+// With unknowns v of the free bodies K u - B v = r, S v - B^T u = q, so that (S - B^T K^-1 B) v = q + B^T K^-1 r and
+// u = K^-1 (r + B v).
+bool Equilibrium::border_tangent() {
+    if (free_.empty()) return true;
+    free_motion_ = free_load_;
+    factor_.solve(free_motion_);
+    const Eigen::MatrixXd schur = free_stiffness_ - free_load_.transpose() * free_motion_;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (schur + schur.transpose()));
+    const double none = no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
+    Eigen::VectorXd yields = Eigen::VectorXd::Zero(schur.rows());
+    for (int k = 0; k < yields.size(); ++k) {
+        if (modes.eigenvalues()[k] < -none) return false;
+        if (modes.eigenvalues()[k] > none) yields[k] = 1.0 / modes.eigenvalues()[k];
+    }
+    free_yield_ = modes.eigenvectors() * yields.asDiagonal() * modes.eigenvectors().transpose();
+    return true;
+}
+
+Eigen::VectorXd Equilibrium::bordered_step(const Eigen::VectorXd& right) const {
+    Eigen::MatrixXd grid = right.head(equations_);
+    factor_.solve(grid);
+    if (free_.empty()) return grid;
+    Eigen::VectorXd step(right.size());
+    const Eigen::VectorXd bodies = free_yield_ * (right.tail(free_yield_.rows()) + free_load_.transpose() * grid.col(0));
+    step << grid.col(0) + free_motion_ * bodies, bodies;
+    return step;
+}
+
+// What the tangent has beyond its factored part, times a step.
+Eigen::VectorXd Equilibrium::remainder_of(const Eigen::VectorXd& step) const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(step.size());
+    for (const Rubbing& r : rubbing_) {
+        std::array<int, 10> rows;
+        std::array<double, 5> weight;
+        for (int a = 0; a < 5; ++a) {
+            weight[a] = a < 4 ? r.weight[a] : -1.0;
+            for (int axis = 0; axis < 2; ++axis)
+                rows[2 * a + axis] = a == 4 ? row_of_body(r.driver, axis) : r.fields[a] < 0 ? -1 : row_of(2 * r.fields[a] + axis);
+        }
+        Vec2 apart = Vec2::Zero();
+        for (int a = 0; a < 10; ++a)
+            if (rows[a] >= 0) apart[a % 2] += weight[a / 2] * step[rows[a]];
+        const Vec2 force = r.remainder * apart;
+        for (int a = 0; a < 10; ++a)
+            if (rows[a] >= 0) sum[rows[a]] += weight[a / 2] * force[a % 2];
+    }
+    return sum;
+}
+
+Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
+    if (rubbing_.empty()) return bordered_step(right);
+    return solve_with_remainder(right, [&](const Eigen::VectorXd& x) { return bordered_step(x); },
+                                [&](const Eigen::VectorXd& x) { return remainder_of(x); });
+}
+
+void Equilibrium::add_rubbing(const std::array<int, 4>& fields, const std::array<double, 4>& weight, int driver, const Mat2& remainder) {
+    if (remainder.isZero(0.0)) return;
+    rubbing_.push_back({fields, weight, driver, remainder});
+    // What is prescribed loads the others here too.
+    Vec2 apart = driver < 0 ? Vec2::Zero() : Vec2(-still_to_go_[driver]);
+    for (int a = 0; a < 4; ++a)
+        for (int axis = 0; axis < 2 && fields[a] >= 0; ++axis) apart[axis] += weight[a] * prescribed_step_[2 * fields[a] + axis];
+    const Vec2 force = remainder * apart;
+    for (int axis = 0; axis < 2; ++axis) {
+        for (int a = 0; a < 4; ++a)
+            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0) step_load_[row] -= weight[a] * force[axis];
+        if (const int row = row_of_body(driver, axis); row >= 0) step_load_[row] += force[axis];
+    }
+}
+
+// Friction between the faces of a pair, on the left one.
+Drag Equilibrium::face_drag(std::size_t k) const {
+    const FieldPair& pair = cracks_.pairs[k];
+    const double friction = scene_.cracks[pair.crack].faces.coefficient;
+    if (friction == 0.0 || mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) return {};
+    const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
+    const Vec2 before = settled_[pair.left] - settled_[pair.right];
+    const double stiffness = pair.normal.dot(face_stiffness(pair) * pair.normal);
+    if (stiffness == 0.0) return {};
+    const double depth = -jump.dot(pair.normal);
+    const double depth_before = std::min(0.0, -before.dot(pair.normal));
+    const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, depth_before, jump - before};
+    return drag(pressing, friction, stiffness, k < face_grips_.size() ? face_grips_[k] : Grip{});
+}
+
+// What pressed faces put on the left one of each pair [N].
+std::vector<Vec2> Equilibrium::face_forces() const {
+    std::vector<Vec2> forces;
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
+        const bool both = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0;
+        forces.push_back(both ? Vec2(face_drag(k).force - face_stiffness(pair) * jump) : Vec2(Vec2::Zero()));
+    }
+    return forces;
+}
+
+// Friction counts from here on.
+void Equilibrium::settle() {
+    for (std::size_t i = 0; i < sliding_.size(); ++i) sliding_[i].settle(place_of(sliding_driver_[i]), displacement_);
+    if (settled_.empty()) return;
+    std::vector<Grip> grips(cracks_.pairs.size());
+    for (std::size_t k = 0; k < grips.size(); ++k) {
+        const Drag drag = face_drag(k);
+        grips[k] = {static_cast<int>(k), drag.stretch};
+        face_dissipated_ += drag.dissipated;
+    }
+    face_grips_ = std::move(grips);
+    settled_ = displacement_;
+}
+
+double Equilibrium::dissipated() const {
+    double sum = face_dissipated_;
+    for (const SlidingBody& body : sliding_) sum += body.dissipated();
+    return sum;
+}
+
+Equilibrium::Contacts Equilibrium::contacts() const {
+    Contacts contacts{moved_, {}, face_grips_, {}};
+    for (const SlidingBody& body : sliding_) {
+        contacts.bodies.push_back(body.grips());
+        contacts.dissipated.push_back(body.dissipated());
+    }
+    contacts.dissipated.push_back(face_dissipated_);
+    return contacts;
+}
+
+void Equilibrium::set_contacts(const Contacts& contacts) {
+    const bool at_start = contacts.moved.empty();
+    moved_ = at_start ? seat_ : contacts.moved;
+    for (std::size_t i = 0; i < sliding_.size(); ++i)
+        sliding_[i].restore(at_start ? std::vector<Grip>{} : contacts.bodies[i], at_start ? 0.0 : contacts.dissipated[i],
+                            place_of(sliding_driver_[i]), displacement_);
+    if (settled_.empty()) return;
+    settled_ = displacement_;
+    face_grips_ = contacts.faces;
+    face_dissipated_ = at_start ? 0.0 : contacts.dissipated.back();
+}
+
+} // namespace crampfit
