@@ -37,20 +37,21 @@ struct Quasistatic::Coarse {
     MaterialMap materials;
     Quasistatic walk;
 
-    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, &leader) {}
+    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader) {}
 };
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers)
-    : Quasistatic(scene, plan, materials, numbers, nullptr) {
-    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, *this);
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+                         int threads)
+    : Quasistatic(scene, plan, materials, numbers, threads, nullptr) {
+    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
-                         const Quasistatic* leader)
+                         int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_) {
+      equilibrium_(scene, plan, materials, body_, threads) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -175,6 +176,7 @@ void Quasistatic::shift(const std::vector<double>& by) {
     if (shift_ == before) return;
     for (Place& place : places_) {
         place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
+        place.guessed.clear();
         place.station.ahead.clear();
     }
     if (shift_.empty()) return;
@@ -227,8 +229,7 @@ bool Quasistatic::know_linear(std::size_t number) {
 // Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
 // asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
 // when a crack has grown at the same time it falls.
-bool Quasistatic::solve_from(double potential, double power, double time) {
-    const double from = equilibrium_.time();
+bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
     if (equilibrium_.solve(time) != Equilibrium::Outcome::solved) return false;
     const double change = equilibrium_.potential() - potential;
@@ -239,19 +240,55 @@ bool Quasistatic::solve_from(double potential, double power, double time) {
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
+// A displacement of an earlier place, on the fields of this one.
+std::vector<Vec2> Quasistatic::handed_on(std::size_t from, const std::vector<Vec2>& before, std::size_t to) const {
+    std::vector<Vec2> displacement = before;
+    std::vector<int> since;  // last first
+    for (int place = static_cast<int>(to); place != static_cast<int>(from); place = places_[place].parent) since.push_back(place);
+    for (auto place = since.rbegin(); place != since.rend(); ++place)
+        for (const auto& [added, source] : places_[*place].new_fields) displacement.push_back(displacement[source]);
+    return displacement;
+}
+
+// From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
+// nearest of these has gone between the two times.
+bool Quasistatic::solve_predicted(std::size_t number, int time) {
+    std::size_t farthest = 1;  // back
+    for (const GrowingTip& tip : growing_) farthest = std::max(farthest, tip.ahead + 1);
+    int before = places_[number].parent;
+    for (std::size_t back = 1; back < farthest && before >= 0 && !places_[before].known.count(time); ++back) before = places_[before].parent;
+    if (before < 0 || !places_[before].known.count(time)) return false;
+    const std::map<int, Known>& there = places_[before].known;
+    const Known* from = nullptr;
+    for (const auto& [t, known] : places_[number].known)
+        if (there.count(t) && (!from || std::abs(t - time) < std::abs(from->time - time))) from = &known;
+    if (!from || from->time == 0) return false;
+    std::vector<Vec2> gone = there.at(time).displacement;
+    const std::vector<Vec2>& start = there.at(from->time).displacement;
+    for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
+    std::vector<Vec2> predicted = handed_on(before, gone, number);
+    for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
+    equilibrium_.set_displacements(predicted, time_of(time));
+    return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
+}
+
 // Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
-bool Quasistatic::solve_for(Place& place, int time) {
+bool Quasistatic::solve_for(std::size_t number, int time) {
+    Place& place = places_[number];
     enter(place);
+    if (solve_predicted(number, time)) return true;
     const std::vector<Vec2> unloaded(equilibrium_.displacements().size(), Vec2::Zero());
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
-    for (const auto* all : {&place.known, &place.guess}) {
-        for (const auto& [number, known] : *all) {
-            if (std::abs(number - time) >= nearest) continue;
-            nearest = std::abs(number - time);
-            from = known;
-        }
-    }
+    const auto consider = [&](const Known& known, bool before) {
+        if (std::abs(known.time - time) >= nearest) return;
+        nearest = std::abs(known.time - time);
+        from = known;
+        if (before) from.displacement = handed_on(place.parent, known.displacement, number);
+    };
+    for (const auto& [t, known] : place.known) consider(known, false);
+    if (place.parent >= 0)
+        for (const auto& [t, known] : places_[place.parent].known) consider(known, true);
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time));
@@ -259,12 +296,12 @@ bool Quasistatic::solve_for(Place& place, int time) {
         double power = from.power;
         bool good = true;
         if (from.time != time && !place.known.count(from.time) && std::isfinite(from.potential)) {  // growth first, then more load
-            good = solve_from(potential, power, time_of(from.time));
+            good = solve_from(potential, power, time_of(from.time), time_of(from.time));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
         for (int part = 1; part <= parts && good; ++part) {
-            good = solve_from(potential, power, std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            good = solve_from(potential, power, equilibrium_.time(), std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
@@ -280,9 +317,47 @@ bool Quasistatic::solve_for(Place& place, int time) {
 
 // Knows the state of a place at a time, as the shift has it.
 bool Quasistatic::know(std::size_t number, int time) {
-    if (places_[number].station.states.count(time)) return true;
+    return places_[number].station.states.count(time) || (rough_ && guess(number, time)) || know_exactly(number, time);
+}
+
+bool Quasistatic::know_exactly(std::size_t number, int time) {
     if (!places_[number].states.count(time) && !find(number, time)) return false;
+    places_[number].guessed.erase(time);
     return shift_.empty() || know_slopes(number, time);
+}
+
+// From the states of a place about a time; beyond them as the nearest one goes: its energy as a power of the time.
+bool Quasistatic::guess(std::size_t number, int time) {
+    Place& place = places_[number];
+    const LoadState* before = nullptr;
+    const LoadState* after = nullptr;
+    for (const auto& [known, state] : place.states) {
+        if (known == 0) continue;
+        if (!place.station.states.count(known) && !know_slopes(number, known)) return false;
+        const LoadState& shown = place.station.states.at(known);
+        if (known <= time) before = &shown;
+        else if (!after) after = &shown;
+    }
+    if (!before && !after) return false;
+    if (place.station.states.count(time)) return true;
+    const LoadState* nearest = before ? before : after;
+    const LoadState found = before && after ? between(*before, *after, time_of(time)) : nearest->gone_on(time_of(time));
+    place.station.states[time] = found;
+    place.guessed.insert(time);
+    return true;
+}
+
+void Quasistatic::set_rough(bool rough) {
+    if (rough_ && !rough) forget_guesses();
+    rough_ = rough;
+}
+
+void Quasistatic::forget_guesses() {
+    for (Place& place : places_) {
+        for (const int time : place.guessed) place.station.states.erase(time);
+        place.guessed.clear();
+        place.station.ahead.clear();
+    }
 }
 
 bool Quasistatic::know_slopes(std::size_t number, int time) {
@@ -312,7 +387,7 @@ bool Quasistatic::find(std::size_t number, int time) {
         keep(number, 0, nothing(0.0));
         return true;
     }
-    if (solve_for(place, time)) {
+    if (solve_for(number, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
         keep(number, time, load_state());
         return true;

@@ -74,18 +74,18 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     if (!leader_) tips &= from.inside;
     if (const auto known = from.next.find(tips); known != from.next.end()) return known->second;
     const int time = time_from(now);
-    if (!leader_ && !know(number, time)) return -1;
+    if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
     if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time));
-    std::map<int, Known> guess = from.known;
+    std::vector<CrackFields::NewField> fields;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
         if (!(tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
         const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.station.states.at(time));
-        for (const auto& [added, origin] : equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to))
-            for (auto& [time_there, known] : guess) known.displacement.push_back(known.displacement[origin]);
+        const auto added = equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to);
+        fields.insert(fields.end(), added.begin(), added.end());
     }
     const int added = add_place(number, tips);
-    places_[added].guess = std::move(guess);
+    places_[added].new_fields = std::move(fields);
     if (plan_.linear && !know_linear(added)) return -1;
     from.next[tips] = added;
     return added;
@@ -225,10 +225,17 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
 Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until) {
     const Station& station = places_[number].station;
     const double toughness = mean_toughness(materials, station.moving);
-    const auto judge = [&]() -> Critical { return {station.critical_time(toughness), toughness}; };
+    const auto judge = [&]() -> Critical { return {station.critical_time(toughness, rough_), toughness}; };
     if (plan_.linear) {
         for (const int time : {0, 1, 2}) know_ahead(number, time);
         return judge();
+    }
+    if (rough_) {
+        const Place& further = places_[places_[number].further];
+        bool some = false;
+        for (const auto& [time, state] : places_[number].states)
+            if (time > 0 && further.states.count(time)) some = know_ahead(static_cast<std::size_t>(number), time) || some;
+        if (some) return judge();
     }
     const auto missing = [&]() -> Critical {
         fail();
