@@ -60,7 +60,8 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
         std::size_t ahead = 0;
-        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        if (crack.advance > 0.0)
+            ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
         if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
         if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
@@ -256,7 +257,8 @@ bool Quasistatic::solve_predicted(std::size_t number, int time) {
     std::size_t farthest = 1;  // back
     for (const GrowingTip& tip : growing_) farthest = std::max(farthest, tip.ahead + 1);
     int before = places_[number].parent;
-    for (std::size_t back = 1; back < farthest && before >= 0 && !places_[before].known.count(time); ++back) before = places_[before].parent;
+    for (std::size_t back = 1; back < farthest && before >= 0 && !places_[before].known.count(time); ++back)
+        before = places_[before].parent;
     if (before < 0 || !places_[before].known.count(time)) return false;
     const std::map<int, Known>& there = places_[before].known;
     const Known* from = nullptr;

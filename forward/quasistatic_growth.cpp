@@ -14,8 +14,8 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that between
-// the tips of a symmetric specimen, and no grid tells them apart.
+// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that
+// between the tips of a symmetric specimen, and no grid tells them apart.
 constexpr double alike = 1e-4;
 
 // A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has changed
@@ -172,8 +172,9 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
         std::size_t f = 0;
         const auto same = [&](std::size_t front) {
             const GrowingTip& other = growing_[std::countr_zero(found[front])];
+            const auto& [its_load, its_toughness] = first[front];
             return other.ahead == tip.ahead && other.increment == tip.increment && load > 0.0 &&
-                   std::abs(first[front].first - load) <= 0.5 * alike * load && std::abs(first[front].second - toughness) <= alike * toughness;
+                   std::abs(its_load - load) <= 0.5 * alike * load && std::abs(its_toughness - toughness) <= alike * toughness;
         };
         while (f < found.size() && !same(f)) ++f;
         if (f == found.size()) {
