@@ -106,17 +106,6 @@ double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& rou
     return sum / length;
 }
 
-double mean_toughness(const MaterialMap& materials, const std::vector<MovingTip>& moving) {
-    if (moving.size() == 1 || moving.front().route.size() == 1) return mean_toughness(materials, moving.front().route);
-    double sum = 0.0;
-    double length = 0.0;
-    for (const MovingTip& tip : moving) {
-        sum += length_of(tip.route) * mean_toughness(materials, tip.route);
-        length += length_of(tip.route);
-    }
-    return sum / length;
-}
-
 LoadState LoadState::gone_on(double to) const {
     const double ratio = to / time;
     const double exponent = potential > 0.0 ? std::clamp(power * time / potential, 1.0, 4.0) : 2.0;
@@ -126,6 +115,17 @@ LoadState LoadState::gone_on(double to) const {
     at.displacement = displacement * ratio;
     for (std::size_t k = 0; k < tips.size(); ++k) at.tips[k].G = tips[k].G * std::pow(ratio, exponent);
     return at;
+}
+
+double mean_toughness(const MaterialMap& materials, const std::vector<MovingTip>& moving) {
+    if (moving.size() == 1 || moving.front().route.size() == 1) return mean_toughness(materials, moving.front().route);
+    double sum = 0.0;
+    double length = 0.0;
+    for (const MovingTip& tip : moving) {
+        sum += length_of(tip.route) * mean_toughness(materials, tip.route);
+        length += length_of(tip.route);
+    }
+    return sum / length;
 }
 
 void extrapolate(LoadState& fine, const LoadState& coarse) {

@@ -22,6 +22,9 @@ constexpr int loading_steps = 32;
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
+// So many places back are asked what the load does there.
+constexpr int farthest_back = 3;
+
 // Part by which the change of the potential over a loading step may differ from the load's work by its ends (trapezoid rule).
 constexpr double most_disagreement = 0.1;
 
@@ -60,8 +63,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
         std::size_t ahead = 0;
-        if (crack.advance > 0.0)
-            ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
         if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
         if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
@@ -241,25 +243,20 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
-// A displacement of an earlier place, on the fields of this one.
-std::vector<Vec2> Quasistatic::handed_on(std::size_t from, const std::vector<Vec2>& before, std::size_t to) const {
-    std::vector<Vec2> displacement = before;
-    std::vector<int> since;  // last first
-    for (int place = static_cast<int>(to); place != static_cast<int>(from); place = places_[place].parent) since.push_back(place);
-    for (auto place = since.rbegin(); place != since.rend(); ++place)
-        for (const auto& [added, source] : places_[*place].new_fields) displacement.push_back(displacement[source]);
+// A displacement of a place, on the fields of one that follows it.
+std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& before, int to) const {
+    if (to == from) return before;
+    std::vector<Vec2> displacement = handed_on(from, before, places_[to].parent);
+    for (const auto& [added, source] : places_[to].new_fields) displacement.push_back(displacement[source]);
     return displacement;
 }
 
 // From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
 // nearest of these has gone between the two times.
 bool Quasistatic::solve_predicted(std::size_t number, int time) {
-    std::size_t farthest = 1;  // back
-    for (const GrowingTip& tip : growing_) farthest = std::max(farthest, tip.ahead + 1);
     int before = places_[number].parent;
-    for (std::size_t back = 1; back < farthest && before >= 0 && !places_[before].known.count(time); ++back)
-        before = places_[before].parent;
-    if (before < 0 || !places_[before].known.count(time)) return false;
+    for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back) before = back < farthest_back ? places_[before].parent : -1;
+    if (before < 0) return false;
     const std::map<int, Known>& there = places_[before].known;
     const Known* from = nullptr;
     for (const auto& [t, known] : places_[number].known)
@@ -268,7 +265,7 @@ bool Quasistatic::solve_predicted(std::size_t number, int time) {
     std::vector<Vec2> gone = there.at(time).displacement;
     const std::vector<Vec2>& start = there.at(from->time).displacement;
     for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
-    std::vector<Vec2> predicted = handed_on(before, gone, number);
+    std::vector<Vec2> predicted = handed_on(before, gone, static_cast<int>(number));
     for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
     equilibrium_.set_displacements(predicted, time_of(time));
     return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
@@ -286,7 +283,7 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
         if (std::abs(known.time - time) >= nearest) return;
         nearest = std::abs(known.time - time);
         from = known;
-        if (before) from.displacement = handed_on(place.parent, known.displacement, number);
+        if (before) from.displacement = handed_on(place.parent, known.displacement, static_cast<int>(number));
     };
     for (const auto& [t, known] : place.known) consider(known, false);
     if (place.parent >= 0)

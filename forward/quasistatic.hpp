@@ -13,12 +13,12 @@
 
 namespace crampfit {
 
-/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, for each of them equilibria
+/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
 /// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
 /// crack took when it was first followed, so that other toughnesses find most of what they need here.
 ///
-/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing
-/// tells apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
+/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing tells
+/// apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
 ///
 /// In a linear scene three states say all about a station. Else equilibria are known at even times, and between them by
 /// interpolation.
@@ -40,9 +40,9 @@ class Quasistatic {
     /// From now on states that are not known need not be found where others of the same place are: they follow from these, roughly.
     void set_rough(bool rough);
 
-    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing
-    /// tip has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which
-    /// one moves. `now` is how far the load has come [s].
+    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
+    /// has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which one
+    /// moves. `now` is how far the load has come [s].
     bool reach(std::size_t station, double now);
 
     /// The station, with all its states that have been asked for. It must have been reached.
@@ -115,7 +115,7 @@ class Quasistatic {
     bool know_linear(std::size_t number);
     bool solve_for(std::size_t number, int time);
     bool solve_predicted(std::size_t number, int time);
-    std::vector<Vec2> handed_on(std::size_t from, const std::vector<Vec2>& before, std::size_t to) const;
+    std::vector<Vec2> handed_on(int from, const std::vector<Vec2>& before, int to) const;
     bool solve_from(double potential, double power, double from, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that
-// between the tips of a symmetric specimen, and no grid tells them apart.
+// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that between
+// the tips of a symmetric specimen, and no grid tells them apart.
 constexpr double alike = 1e-4;
 
 // A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has changed
@@ -80,9 +80,9 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     std::vector<CrackFields::NewField> fields;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
         if (!(tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
-        const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.station.states.at(time));
-        const auto added = equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to);
-        fields.insert(fields.end(), added.begin(), added.end());
+        const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.states.at(time));
+        const auto grown = equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to);
+        fields.insert(fields.end(), grown.begin(), grown.end());
     }
     const int added = add_place(number, tips);
     places_[added].new_fields = std::move(fields);
@@ -172,9 +172,8 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
         std::size_t f = 0;
         const auto same = [&](std::size_t front) {
             const GrowingTip& other = growing_[std::countr_zero(found[front])];
-            const auto& [its_load, its_toughness] = first[front];
             return other.ahead == tip.ahead && other.increment == tip.increment && load > 0.0 &&
-                   std::abs(its_load - load) <= 0.5 * alike * load && std::abs(its_toughness - toughness) <= alike * toughness;
+                   std::abs(first[front].first - load) <= 0.5 * alike * load && std::abs(first[front].second - toughness) <= alike * toughness;
         };
         while (f < found.size() && !same(f)) ++f;
         if (f == found.size()) {
@@ -231,17 +230,16 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         for (const int time : {0, 1, 2}) know_ahead(number, time);
         return judge();
     }
-    if (rough_) {
-        const Place& further = places_[places_[number].further];
-        bool some = false;
-        for (const auto& [time, state] : places_[number].states)
-            if (time > 0 && further.states.count(time)) some = know_ahead(static_cast<std::size_t>(number), time) || some;
-        if (some) return judge();
-    }
     const auto missing = [&]() -> Critical {
         fail();
         return {};
     };
+    if (rough_) {
+        bool some = false;
+        for (const auto& [time, state] : places_[number].states)
+            if (time > 0 && places_[places_[number].further].states.count(time)) some = know_ahead(number, time) || some;
+        if (some) return judge();
+    }
     int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
     int high = low + 1;
     // As long as G at the tip is this far below the toughness, what lies ahead is not asked for; were the next advance to release
