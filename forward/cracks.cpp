@@ -24,7 +24,7 @@ constexpr double tip_lag = 0.25;
 // A tip that comes nearer to another crack than this part of a cell has met it.
 constexpr double meeting_distance = 0.5;
 
-// Cracks that meet at less than this angle, the tip of one at the tip of the other, become one; else one runs into the other's face.
+// Cracks that meet tip at tip at less than this angle become one; else one runs into the other's face.
 constexpr double least_sine_of_a_junction = 0.5;
 
 // How far ahead of where a crack ends, at a hole or on another crack, a node's support can still be cut by it, in cells.
@@ -171,13 +171,16 @@ std::optional<CrackFields::Meeting> CrackFields::meeting(int crack, const Vec2& 
             if (gone > 1e-9 && gone <= first && there >= 0.0 && there <= 1.0) {
                 first = gone;
                 nearest = 0.0;
-                found = {from + gone * step, k, along.normalized()};
+                found = {from + gone * step, k};
             }
-            const auto place_near = [&](const Vec2& x) { return Vec2(points[i] + nearest_on_segment(points[i], points[i + 1], x) * along); };
-            const double distance = (place_near(to) - to).norm();
-            if (distance >= nearest || distance >= (1.0 - 1e-9) * (place_near(from) - from).norm()) continue;  // it must come nearer
+            const auto nearest_to = [&](const Vec2& x) -> Vec2 {
+                return points[i] + nearest_on_segment(points[i], points[i + 1], x) * along;
+            };
+            const double distance = (nearest_to(to) - to).norm();
+            const bool comes_nearer = distance < (1.0 - 1e-9) * (nearest_to(from) - from).norm();
+            if (distance >= nearest || !comes_nearer) continue;
             nearest = distance;
-            found = {place_near(to), k, along.normalized()};
+            found = {nearest_to(to), k};
         }
     }
     return found;

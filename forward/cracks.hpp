@@ -74,8 +74,8 @@ class CrackFields {
 
     int fields() const { return static_cast<int>(node_of_field.size()); }
 
-    /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Where it meets another crack on the way, or
-    /// comes so near that the grid does not tell, it ends there. Returns the fields that this adds.
+    /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Where it meets another crack on the
+    /// way, or comes so near that the grid does not tell, it ends there. Returns the fields that this adds.
     std::vector<NewField> grow(int crack, bool at_end, const Vec2& to);
 
     /// Where points change sides when a tip goes from one place to another.
@@ -87,9 +87,8 @@ class CrackFields {
   private:
     bool is_left(int crack, const Vec2& x) const;
     struct Meeting {
-        Vec2 at;      // [m]
+        Vec2 at;   // [m]
         int crack;
-        Vec2 along;   // unit, of that crack there
     };
     std::optional<Meeting> meeting(int crack, const Vec2& from, const Vec2& to, double near) const;
     void end_at(CrackTip& tip, const Meeting& there);

@@ -83,7 +83,8 @@ class WoodGradient {
 class Extension {
   public:
     // It keeps off other wood, or not.
-    Extension(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end, const EnergyReleaseOptions& options, bool keeps_off)
+    Extension(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end, const EnergyReleaseOptions& options,
+              bool keeps_off)
         : body_(body), line_(cracks.lines[crack]), at_end_(at_end) {
         const double h = body.layout.cell.maxCoeff();
         const double near = (options.outer + options.margin) * h;
@@ -388,9 +389,9 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) { return piece.near < 2.0 * h; });
     load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];
-    // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better: it
-    // holds across boundaries, with a domain that is as wide as elsewhere. With the tip 4 cells off a boundary J, whose domain is then
-    // small, is 3 % low, and K^2 / E' is within 0.2 % from 3 cells on (`VerificationBoundary`).
+    // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better:
+    // it holds across boundaries, with a domain as wide as elsewhere. With the tip 4 cells off a boundary J, whose domain is
+    // small then, is 3 % low, and K^2 / E' is within 0.4 % from 2 cells on (`VerificationBoundary`).
     // Beside a boundary J needs no gradient term and is as good as in one wood, and K means nothing on the boundary itself.
     if (extension.meets_other_wood && !J.beside_changes && in_one_wood(body, materials, tip.position)) {
         const Mat2 H = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction).release();

@@ -454,8 +454,9 @@ void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
         const int c = body_.points.cell[p];
         if (c == last || before[p] == body_.points.node[p]) continue;
         last = c;
-        body_.for_cells_in({body_.layout.cell_corner(c) - 0.5 * body_.layout.cell, body_.layout.cell_corner(c) + 1.5 * body_.layout.cell},
-                           [&](int near) { factor_.mark(near); });
+        const Vec2 corner = body_.layout.cell_corner(c);
+        const Vec2& cell = body_.layout.cell;
+        body_.for_cells_in({corner - 0.5 * cell, corner + 1.5 * cell}, [&](int near) { factor_.mark(near); });
     }
 }
 

@@ -114,7 +114,8 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     for (const InternalForce::Alone& alone : internal_force_.alone()) {
         const Vec2 cross = internal_force_.crosswise(alone.point, displacement_);
         for (std::size_t n = 0; n < numbers.size(); ++n) {
-            const Vec2 pull = internal_force_.crosswise_stiffness(alone.point, numbers[n].stiffness(points.cell[alone.point])) * cross;
+            const Eigen::Matrix3d& C = numbers[n].stiffness(points.cell[alone.point]);
+            const Vec2 pull = internal_force_.crosswise_stiffness(alone.point, C) * cross;
             slope.potential[n] += 0.5 * pull.dot(cross);
             for (int k = 0; k < 4; ++k) add(n, points.node[alone.point][k], InternalForce::crosswise_sign[k] * pull);
         }
@@ -162,7 +163,8 @@ std::vector<std::vector<Vec2>> Equilibrium::displacement_slopes(const Slopes& sl
 }
 
 // By a central difference of G, displacements and wood moving with the number. Of the wood only that around the tip counts.
-double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope) {
+double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& number,
+                                  const std::vector<Vec2>& displacement_slope) {
     constexpr double reach = 7.0;  // [cells] farther than the virtual extension
     Points& points = body_.points;
     struct Wood {

@@ -54,7 +54,8 @@ LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cra
 
     LoosePieces found;
     found.loose.assign(piece.size(), false);
-    for (std::size_t f = 0; f < piece.size(); ++f) found.loose[f] = mass[f] > 0.0 && holds.at(piece[f]).isZero(0.0) && !pulled[piece[f]];
+    for (std::size_t f = 0; f < piece.size(); ++f)
+        found.loose[f] = mass[f] > 0.0 && holds.at(piece[f]).isZero(0.0) && !pulled[piece[f]];
     for (auto& [own, sum] : holds) {
         while (!pulled[own]) {
             constexpr double nothing = 1e-6;  // squared distance of neighbouring nodes over the specimen's size, and less

@@ -211,7 +211,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
-               : may_meet              ? "solver.extrapolate asks for a second, but where cracks come near each other it would not see the wood between them"
+               : may_meet              ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
                : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
                                           : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",
@@ -229,7 +229,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
 
     if (scene.cracks.empty()) choose("crack fields", "none", "no crack");
     else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
-                "two fields at nodes whose support a crack cuts, one elsewhere");
+                std::string("two fields at nodes whose support a crack cuts, ") +
+                    (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere");
     if (!scene.cracks.empty())
         choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "every second step at each growing tip", "domain form, 4 cells around the tip");
     const int tips = growing_tips(scene);

@@ -90,7 +90,8 @@ class Tracer {
             const Station& here = walk_.station(i);
             for (const auto& [crack, at_end, route] : before.moving) {
                 const auto same = [k = crack](const MovingTip& tip) { return tip.crack == k; };
-                const auto ends = std::count_if(before.moving.begin(), before.moving.end(), same);  // that share what the crack has grown
+                // Both ends of a crack share what it has grown.
+                const auto ends = std::count_if(before.moving.begin(), before.moving.end(), same);
                 const double grown = (here.lengths[crack] - before.lengths[crack]) / static_cast<double>(ends);
                 spent += grown * here.thickness * mean_toughness(materials_, {before.tips[crack][at_end], here.tips[crack][at_end]});
             }
@@ -141,7 +142,8 @@ class Tracer {
                 add(after, true);
                 here = after;
                 if (beyond_length(after)) return end(RunStatus::finished, "a stop condition was met");
-                if (left) return parted ? end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more") : split();
+                if (parted) return end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more");
+                if (left) return split();
             }
             i = next;
         }

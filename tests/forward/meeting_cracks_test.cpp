@@ -63,7 +63,8 @@ TEST(HardMeeting, ACrackThatRunsIntoAnotherCutsABlockFree) {
             alone.edges[1].range = {{7.9e-3, 20e-3}};
             alone.stop.displacement = 1e-5;
             const double left = stiffness_at_the_end(simulate(alone));
-            hard_case(name, "carries as the specimen without the block, with a slit", stiffness_at_the_end(record) / left - 1, lift == 0.4 ? 0.02 : 1e-6);
+            hard_case(name, "carries as the specimen without the block, with a slit", stiffness_at_the_end(record) / left - 1,
+                      lift == 0.4 ? 1e-3 : 1e-6);
             EXPECT_LT(stiffness_at_the_end(record), exact);
         }
     }
@@ -102,7 +103,9 @@ TEST(HardMeeting, CracksThatPassEachOtherCurveIn) {
     for (Crack& crack : scene.cracks) crack.direction = GrowthDirection::hoop_stress;
     scene.stop.displacement = 2e-3;
     const Record record = simulate(scene);
-    const double end = record.series.back().force, most = std::max_element(record.series.begin(), record.series.end(), [](auto& a, auto& b) { return a.force < b.force; })->force;
+    const double end = record.series.back().force;
+    double most = 0.0;
+    for (const Instant& row : record.series) most = std::max(most, row.force);
     std::printf("en passant: %s, lengths %.2f and %.2f mm, force at the end %.2e of the peak, %ld equilibria\n", name(record.status),
                 1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back(), end / most, record.steps);
     EXPECT_NE(record.status, RunStatus::unstable) << record.message;
@@ -114,7 +117,8 @@ TEST(HardMeeting, CrossesThatCutAPlateInFourCarryNothing) {
     for (const double angle : {0.0, 31.0}) {
         const Vec2 along(std::cos(angle * degree), std::sin(angle * degree)), across(-along.y(), along.x());
         const Vec2 centre(10.3, 9.8);
-        const Record record = simulate(square({line(centre - 40 * along, centre + 40 * along), line(centre - 40 * across, centre + 40 * across)}));
+        const Record record = simulate(
+            square({line(centre - 40 * along, centre + 40 * along), line(centre - 40 * across, centre + 40 * across)}));
         hard_case(fmt::format("cracks through a plate that cross, {:.0f} deg", angle), "nothing is carried", record.series.back().force, 1e-9);
     }
 }

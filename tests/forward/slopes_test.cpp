@@ -122,6 +122,51 @@ TEST(GradientRecord, WhereTheTipsOwnGSaysWhenItMoves) {
     }
 }
 
+// Force at a displacement, between rows on a straight line; where the crack jumps there, before that or after it.
+double force_at(const Record& record, double displacement, bool after) {
+    const auto& rows = record.series;
+    std::size_t i = 1;
+    while (i + 1 < rows.size() && (after ? rows[i].displacement <= displacement : rows[i].displacement < displacement)) ++i;
+    const Instant &a = rows[i - 1], &b = rows[i];
+    return std::lerp(a.force, b.force, (displacement - a.displacement) / (b.displacement - a.displacement));
+}
+
+TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
+    // At the very displacement of a jump a number that delays it tells the slope of the force before the jump, one that hastens it the
+    // slope after it: the first by one-sided differences of the walk, the second by those of whole runs, (4 f(s) - f(2 s) - 3 f(0)) / 2 s.
+    for (const double advance : {0.8e-3, 0.0}) {
+        Scene scene = across_rings(0.4e-3);
+        scene.cracks[0].advance = advance;
+        KeptWalk walk(scene, numbers);
+        const Record base = walk.run(scene, {});
+        std::size_t jump = 1;
+        while (jump < base.series.size() && base.series[jump].crack_length - base.series[jump - 1].crack_length < 0.5e-3) ++jump;
+        ASSERT_LT(jump, base.series.size());
+        const double there = base.series[jump - 1].displacement;
+        for (const std::string& key : {std::string("materials.EW.E"), std::string("materials.EW.nu"), std::string("materials.EW.toughness")}) {
+            for (const double side : {1.0, -1.0}) {  // of the number
+                const auto at = [&](double change) {
+                    Scene other = scene;
+                    set_number(other, key, get_number(scene, key) * (1.0 + side * change));
+                    return other;
+                };
+                constexpr double small = 1e-7, step = 1e-4;
+                const Record near = walk.run(at(small), {});
+                const double moved = near.series[jump - 1].displacement;
+                const bool after = moved < there;
+                if (after && jump + 1 == base.series.size()) continue;  // it goes right through
+                const double here = base.series[after ? jump : jump - 1].force;
+                const double slope = (force_at(near, there, after) - here) / small;
+                const auto whole = [&](double change) { return force_at(KeptWalk(at(change)).run(at(change), {}), there, after); };
+                const double difference = (4.0 * whole(step) - whole(2.0 * step) - 3.0 * here) / (2.0 * step);
+                std::printf("jump at %.4f mm, advance %.1f mm, %s %s: force %s it goes by %.6f N, by differences %.6f N\n", 1e3 * there, 1e3 * advance,
+                            key.c_str(), side > 0 ? "more" : "less", after ? "after" : "before", slope, difference);
+                EXPECT_NEAR(slope, difference, 1e-5 * std::abs(difference)) << key;
+            }
+        }
+    }
+}
+
 TEST(GradientRecord, OfAWedgeTest) {
     // Newton's method leaves up to 1e-7 of the largest force out of balance, which the differences of whole runs make 1e-4 of a
     // derivative: with 1e-9 instead all agree to 1e-6. A wider step would take corners of the curve past the times of the rows.
