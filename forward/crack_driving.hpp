@@ -18,6 +18,9 @@ struct LoadState {
     double displacement = 0;        // of the measured edge or body [m]
     std::vector<Vec2> reactions;    // [drivers] [N]
     std::vector<TipLoad> tips;      // two a crack: start, end
+
+    /// What it is roughly like at another time, if the potential goes as the power of the time that its slope says.
+    LoadState gone_on(double to) const;
 };
 
 /// The same equilibrium at another load, where everything goes linearly with the load from none on.
@@ -25,6 +28,9 @@ LoadState scaled(const LoadState& state, double factor);
 
 /// Takes off a third of the difference to a grid with cells twice as wide, all but G and K.
 void extrapolate(LoadState& fine, const LoadState& coarse);
+
+/// What lies between two equilibria of the same crack, at a time.
+LoadState between(const LoadState& from, const LoadState& to, double time);
 
 /// A crack length and what is known of it: equilibria at several times, and how much energy the next `advance` would release.
 struct Station {
@@ -53,8 +59,9 @@ struct Station {
     LoadState at(double time) const;
 
     /// The first time at which the next advance releases as much energy as it costs, with `toughness` the mean over the route
-    /// [J/m^2], between what is known; infinite where it does not within that [s].
-    double critical_time(double toughness) const;
+    /// [J/m^2], between what is known; infinite where it does not within that [s]. `beyond` it: the energy released goes on as a power
+    /// of the time.
+    double critical_time(double toughness, bool beyond = false) const;
 };
 
 /// Mean toughness of the wood along a route; of one place, at it [J/m^2].

@@ -26,8 +26,11 @@ constexpr int most_iterations = 60;
 // 1e-3 of a held one.
 constexpr double least_reciprocal_condition = 1e-10;
 
-// An old tangent goes on as long as it makes the forces out of balance smaller by this: four such steps cost as much as a new one.
-constexpr double worth_keeping = 0.25;
+// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
+// as much as a new one.
+constexpr double worth_keeping = 5.0;
+// With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
+constexpr double worth_keeping_with_friction = 0.25;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -35,10 +38,10 @@ constexpr double least_strain = 1e-5;
 
 } // namespace
 
-Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
+Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, plan.rotates),
-      factor_(body.layout.cells_x, body.layout.cells_y) {
+      factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
@@ -137,18 +140,9 @@ void Equilibrium::find_forces() {
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
 
-// What prescribed components still have to go loads the others.
-GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {
     GridFactor::Element made{{}, stiffness};
-    std::array<int, 8> rows;
-    std::array<double, 8> steps;
-    for (int a = 0; a < 8; ++a) {
-        const int dof = 2 * fields[a / 2] + a % 2;
-        made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[dof];
-        rows[a] = fields[a / 2] < 0 ? -1 : row_of(dof);
-        steps[a] = fields[a / 2] < 0 ? 0.0 : prescribed_step_[dof];
-    }
-    couple(rows, steps, stiffness);
+    for (int a = 0; a < 8; ++a) made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
     return made;
 }
 
@@ -167,31 +161,46 @@ void Equilibrium::couple(std::span<const int> rows, std::span<const double> step
     }
 }
 
-void Equilibrium::add_points(int c, bool geometric, std::vector<GridFactor::Element>& elements) {
+void Equilibrium::add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    std::array<int, 8> rows;
+    std::array<double, 8> steps;
+    for (int a = 0; a < 8; ++a) {
+        const int dof = 2 * fields[a / 2] + a % 2;
+        rows[a] = fields[a / 2] < 0 ? -1 : row_of(dof);
+        steps[a] = fields[a / 2] < 0 ? 0.0 : prescribed_step_[dof];
+    }
+    couple(rows, steps, stiffness);
+}
+
+void Equilibrium::add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    extra_.emplace(cell, element(fields, stiffness));
+    add_step_load(fields, stiffness);
+}
+
+// Points of a cell that follow each other on the same fields go together.
+template <class Visit>
+void Equilibrium::for_groups_of(int c, const Visit& visit) const {
     const Points& points = body_.points;
-    const auto add_point = [&](int p, Eigen::Matrix<double, 8, 8>& sum) {
-        const CellWeights& w = body_.weights[points.slot[p]];
-        const Eigen::Matrix4d A =
-            points.volume[p] * elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(),
-                                               points.stiffness_of(p), plan_.rotates, geometric);
-        for (int b = 0; b < 4; ++b) {
-            for (int k = 0; k < 2; ++k) {
-                const Eigen::Vector4d stress = w.slope_x[b] * A.col(2 * k) + w.slope_y[b] * A.col(2 * k + 1);  // per displacement
-                for (int a = 0; a < 4; ++a) {
-                    sum(2 * a, 2 * b + k) += stress[0] * w.slope_x[a] + stress[1] * w.slope_y[a];
-                    sum(2 * a + 1, 2 * b + k) += stress[2] * w.slope_x[a] + stress[3] * w.slope_y[a];
-                }
-            }
-        }
-    };
     int p = points.first_of_cell[c];
     const int last = points.first_of_cell[c + 1];
-    while (p < last) {  // points side by side on the same fields go together
-        const std::array<int, 4>& fields = points.node[p];
-        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
-        for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
-        elements.push_back(element(fields, sum));
+    while (p < last) {
+        const int first = p;
+        while (p < last && points.node[p] == points.node[first]) ++p;
+        visit(points.node[first], first, p - first);
     }
+}
+
+// What prescribed components that still have to go, and free bodies that hold some, put on the points' cells.
+void Equilibrium::add_step_loads(bool geometric) {
+    const auto moves = [&](int dof) { return prescribed_step_[dof] != 0.0 || free_of_dof_[dof] >= 0; };
+    const auto goes = [&](int f) { return moves(2 * f) || moves(2 * f + 1); };
+    const bool none_goes = std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; });
+    if (none_goes && free_.empty()) return;
+    for (int c = 0; c < body_.layout.cells(); ++c)
+        for_groups_of(c, [&](const std::array<int, 4>& fields, int first, int count) {
+            if (std::any_of(fields.begin(), fields.end(), goes))
+                add_step_load(fields, internal_force_.tangent(first, count, displacement_, geometric));
+        });
 }
 
 void Equilibrium::add_pairs() {
@@ -213,7 +222,7 @@ void Equilibrium::add_pairs() {
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
-        extra_.emplace(cell, element({pair.left, pair.right, -1, -1}, both));
+        add_extra(cell, {pair.left, pair.right, -1, -1}, both);
     }
 }
 
@@ -223,7 +232,7 @@ void Equilibrium::add_lone_points() {
         Eigen::Matrix<double, 8, 8> tangent;
         for (int a = 0; a < 4; ++a)
             for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
-        extra_.emplace(body_.points.cell[alone.point], element(body_.points.node[alone.point], tangent));
+        add_extra(body_.points.cell[alone.point], body_.points.node[alone.point], tangent);
     }
 }
 
@@ -240,7 +249,7 @@ void Equilibrium::add_touches(bool geometric) {
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
-            extra_.emplace(body_.points.cell[facet.point], element(fields, tangent));
+            add_extra(body_.points.cell[facet.point], fields, tangent);
             if (touch.drag.limit > 0.0) add_rubbing(fields, facet.weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
             // The other end of the spring is the body.
             std::array<int, 10> rows;
@@ -271,12 +280,16 @@ bool Equilibrium::factor_tangent(bool geometric) {
     free_stiffness_.setZero(free, free);
     rubbing_.clear();
     extra_.clear();
+    lessons_.clear();
     add_lone_points();
     add_pairs();
     add_touches(geometric);
+    add_step_loads(geometric);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
-        add_points(cell, geometric, elements);
+        for_groups_of(cell, [&](const std::array<int, 4>& fields, int first_point, int count) {
+            elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
+        });
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
     };
@@ -313,7 +326,7 @@ void Equilibrium::move(const Eigen::VectorXd& step, double share) {
 }
 
 // A full Newton step, or less of it where contact changes so much on the way that the potential has long been rising again.
-void Equilibrium::take_step(const Eigen::VectorXd& step) {
+double Equilibrium::take_step(const Eigen::VectorXd& step) {
     const double at_start = slope_along(step);
     double low = 0.0, high = 1.0, at_low = at_start, gone = 1.0;
     move(step, 1.0);
@@ -331,6 +344,27 @@ void Equilibrium::take_step(const Eigen::VectorXd& step) {
         find_forces();
         here = slope_along(step);
     }
+    return gone;
+}
+
+// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes few
+// directions, which a few steps tell.
+Eigen::VectorXd Equilibrium::newton_step(Eigen::VectorXd load) const {
+    std::vector<double> share(lessons_.size());
+    for (std::size_t k = lessons_.size(); k-- > 0;) {
+        share[k] = lessons_[k].step.dot(load) / lessons_[k].work;
+        load -= share[k] * lessons_[k].force;
+    }
+    Eigen::VectorXd step = tangent_step(load);
+    for (std::size_t k = 0; k < lessons_.size(); ++k)
+        step += (share[k] - lessons_[k].force.dot(step) / lessons_[k].work) * lessons_[k].step;
+    return step;
+}
+
+void Equilibrium::learn(Eigen::VectorXd step, Eigen::VectorXd force) {
+    if (!rubbing_.empty()) return;  // the tangent is not symmetric
+    const double work = step.dot(force);
+    if (work > 1e-8 * step.norm() * force.norm()) lessons_.push_back({std::move(step), std::move(force), work});
 }
 
 Equilibrium::Outcome Equilibrium::solve(double time) {
@@ -339,6 +373,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     double residual = 0.0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
+        if (iteration == 0) residual = largest_residual();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
         if (renew && !factor_tangent(true) && !factor_tangent(false)) {
             if (time_ == time) return Outcome::mechanism;
@@ -347,7 +382,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             find_forces();
             if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         }
-        const Eigen::VectorXd step = tangent_step(out_of_balance() + step_load_);
+        const Eigen::VectorXd start = out_of_balance();
+        const Eigen::VectorXd step = newton_step(start + step_load_);
         step_load_.setZero();
         const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
         if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
@@ -355,7 +391,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             move(step, 1.0);
             find_forces();
         } else {
-            take_step(step);
+            const double share = take_step(step);
+            learn(share * step, start - out_of_balance());
         }
         double scale = least_force_;
         for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
@@ -365,7 +402,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             settle();
             return Outcome::solved;
         }
-        renew = residual > worth_keeping * before;
+        renew = plan_.friction ? residual > worth_keeping_with_friction * before
+              : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
 }

@@ -23,7 +23,8 @@ namespace crampfit {
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
   public:
-    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
+    /// Equations are solved by `threads` threads, with the same bits whatever their number.
+    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
 
     enum class Outcome { solved, not_converged, mechanism };  // mechanism: something can move without resistance
 
@@ -94,8 +95,12 @@ class Equilibrium {
     void renumber();
     void find_forces();
     bool factor_tangent(bool geometric);
-    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
-    void add_points(int cell, bool geometric, std::vector<GridFactor::Element>& elements);
+    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
+    void add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    void add_step_loads(bool geometric);
+    void add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    template <class Visit>
+    void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
     void add_pairs();
     void add_touches(bool geometric);
@@ -122,7 +127,9 @@ class Equilibrium {
     double largest_residual() const;
     double slope_along(const Eigen::VectorXd& step) const;
     void move(const Eigen::VectorXd& step, double share);
-    void take_step(const Eigen::VectorXd& step);
+    double take_step(const Eigen::VectorXd& step);
+    Eigen::VectorXd newton_step(Eigen::VectorXd load) const;
+    void learn(Eigen::VectorXd step, Eigen::VectorXd force);
     void prescribe(double time);
     void move_prescribed();
 
@@ -184,6 +191,13 @@ class Equilibrium {
     std::vector<Vec2> settled_;       // displacement from which friction on crack faces counts; empty: no such faces
     std::vector<Grip> face_grips_;    // [pairs, or fewer: the others have not slid yet]
     double face_dissipated_ = 0;      // until then [J]
+
+    struct Lesson {
+        Eigen::VectorXd step;         // that was taken [m]
+        Eigen::VectorXd force;        // that it needed [N]
+        double work;                  // their product [J]
+    };
+    std::vector<Lesson> lessons_;     // since the tangent was factored
 };
 
 } // namespace crampfit

@@ -1,7 +1,6 @@
 #include "forward/deformation.hpp"
 #include "forward/equilibrium.hpp"
 
-#include <set>
 
 namespace crampfit {
 
@@ -23,19 +22,11 @@ Eigen::Vector4d in_turned_frame(const Polar& polar, const Mat2& gradient) {
 // What motions of the drivers put on the equations, by the tangent where it stands.
 Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     prescribed_step_.assign(equation_.size(), 0.0);
-    std::set<int> cells;  // that hold a component that moves
-    for (const Boundary::Held& held : boundary_.held) {
-        const double step = drivers[held.driver][held.axis];
-        if (step == 0.0) continue;
-        prescribed_step_[2 * held.field + held.axis] = step;
-        const Vec2 x = body_.layout.node_position(cracks_.node_of_field[held.field]);
-        body_.for_cells_near(x, 0.5 * body_.layout.cell.minCoeff(), [&](int c) { cells.insert(c); });
-    }
+    for (const Boundary::Held& held : boundary_.held) prescribed_step_[2 * held.field + held.axis] = drivers[held.driver][held.axis];
     still_to_go_ = drivers;
     step_load_.setZero(equations_);
     extra_.clear();
-    std::vector<GridFactor::Element> elements;
-    for (const int c : cells) add_points(c, true, elements);
+    add_step_loads(true);
     add_lone_points();
     add_pairs();
     add_touches(true);

@@ -16,7 +16,8 @@ class KeptWalk {
   public:
     /// `numbers`: keys of numbers of the materials, other than toughness, by which derivatives are wanted. Throws InputError as
     /// `simulate` does.
-    explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {});
+    /// Equations are solved by `threads` threads.
+    explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {}, int threads = 1);
 
     /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had. Nor where bodies follow a
     /// force.
@@ -26,15 +27,16 @@ class KeptWalk {
     /// friction, where a state hangs on the way to it.
     bool reusable() const { return reusable_; }
 
-    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. One run at a
-    /// time: others wait.
-    Record run(const Scene& scene, const SimulateOptions& options);
+    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
+    /// with the equilibria that are known, where it can. One run at a time: others wait.
+    Record run(const Scene& scene, const SimulateOptions& options, bool rough = false);
 
   private:
     Scene scene_;
     MaterialMap materials_;
     Plan plan_;
     std::vector<std::string> numbers_;
+    int threads_ = 1;
     bool reusable_ = false;
     bool has_slopes_ = false;
     std::mutex mutex_;

@@ -43,20 +43,21 @@ struct Quasistatic::Coarse {
     MaterialMap materials;
     Quasistatic walk;
 
-    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, &leader) {}
+    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader) {}
 };
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers)
-    : Quasistatic(scene, plan, materials, numbers, nullptr) {
-    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, *this);
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+                         int threads)
+    : Quasistatic(scene, plan, materials, numbers, threads, nullptr) {
+    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
-                         const Quasistatic* leader)
+                         int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_) {
+      equilibrium_(scene, plan, materials, body_, threads) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -196,6 +197,7 @@ void Quasistatic::shift(const std::vector<double>& by) {
     if (shift_ == before) return;
     for (Place& place : places_) {
         place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
+        place.guessed.clear();
         place.station.ahead.clear();
     }
     if (shift_.empty()) return;
@@ -252,8 +254,7 @@ bool Quasistatic::know_linear(std::size_t number) {
 // Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
 // asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
 // when a crack has grown at the same time it falls.
-bool Quasistatic::solve_from(double potential, double power, double time) {
-    const double from = equilibrium_.time();
+bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
     if (equilibrium_.solve(time) != Equilibrium::Outcome::solved) return false;
     const double change = equilibrium_.potential() - potential;
@@ -264,19 +265,57 @@ bool Quasistatic::solve_from(double potential, double power, double time) {
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
+// A displacement of an earlier place, on the fields of this one.
+std::vector<Vec2> Quasistatic::handed_on(std::size_t from, const std::vector<Vec2>& before, std::size_t to) const {
+    std::vector<Vec2> displacement = before;
+    for (std::size_t place = from + 1; place <= to; ++place)
+        for (const auto& [added, source] : places_[place].new_fields) displacement.push_back(displacement[source]);
+    return displacement;
+}
+
+// From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
+// nearest of these has gone between the two times.
+bool Quasistatic::solve_predicted(std::size_t number, int time) {
+    if (plan_.friction) return false;  // slip counts from the equilibrium before
+    const auto known_at = [&](std::size_t place) { return places_[place].known.count(time) > 0; };
+    std::size_t before = number;
+    for (std::size_t back = 1; back <= std::min(number, ahead_ + 1) && before == number; ++back)
+        if (known_at(number - back)) before = number - back;
+    if (before == number) return false;
+    const std::map<int, Known>& there = places_[before].known;
+    const Known* from = nullptr;
+    for (const auto& [t, known] : places_[number].known)
+        if (there.count(t) && (!from || std::abs(t - time) < std::abs(from->time - time))) from = &known;
+    if (!from || from->time == 0) return false;
+    std::vector<Vec2> gone = there.at(time).displacement;
+    const std::vector<Vec2>& start = there.at(from->time).displacement;
+    for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
+    std::vector<Vec2> predicted = handed_on(before, gone, number);
+    for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
+    Equilibrium::Contacts contacts = from->contacts;
+    for (std::size_t d = 0; d < contacts.moved.size(); ++d)
+        contacts.moved[d] += there.at(time).contacts.moved[d] - there.at(from->time).contacts.moved[d];
+    equilibrium_.set_displacements(predicted, time_of(time), contacts);
+    return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
+}
+
 // Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
-bool Quasistatic::solve_for(Place& place, int time) {
+bool Quasistatic::solve_for(std::size_t number, int time) {
+    Place& place = places_[number];
     enter(place);
+    if (solve_predicted(number, time)) return true;
     const std::vector<Vec2> unloaded(equilibrium_.displacements().size(), Vec2::Zero());
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
-    for (const auto* all : {&place.known, &place.guess}) {
-        for (const auto& [number, known] : *all) {
-            if (std::abs(number - time) >= nearest || (plan_.friction && number > time)) continue;  // friction: by loading alone
-            nearest = std::abs(number - time);
-            from = known;
-        }
-    }
+    const auto consider = [&](const Known& known, bool before) {
+        if (std::abs(known.time - time) >= nearest || (plan_.friction && known.time > time)) return;  // friction: by loading alone
+        nearest = std::abs(known.time - time);
+        from = known;
+        if (before) from.displacement = handed_on(number - 1, known.displacement, number);
+    };
+    for (const auto& [t, known] : place.known) consider(known, false);
+    if (number > 0)
+        for (const auto& [t, known] : places_[number - 1].known) consider(known, true);
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
@@ -284,12 +323,12 @@ bool Quasistatic::solve_for(Place& place, int time) {
         double power = from.power;
         bool good = true;
         if (from.time != time && !place.known.count(from.time) && std::isfinite(from.potential)) {  // growth first, then more load
-            good = solve_from(potential, power, time_of(from.time));
+            good = solve_from(potential, power, time_of(from.time), time_of(from.time));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
         for (int part = 1; part <= parts && good; ++part) {
-            good = solve_from(potential, power, std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            good = solve_from(potential, power, equilibrium_.time(), std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
@@ -305,9 +344,47 @@ bool Quasistatic::solve_for(Place& place, int time) {
 
 // Knows the state of a place at a time, as the shift has it.
 bool Quasistatic::know(std::size_t number, int time) {
-    if (places_[number].station.states.count(time)) return true;
+    return places_[number].station.states.count(time) || (rough_ && guess(number, time)) || know_exactly(number, time);
+}
+
+bool Quasistatic::know_exactly(std::size_t number, int time) {
     if (!places_[number].states.count(time) && !find(number, time)) return false;
+    places_[number].guessed.erase(time);
     return shift_.empty() || know_slopes(number, time);
+}
+
+// From the states of a place about a time; beyond them as the nearest one goes: its energy as a power of the time.
+bool Quasistatic::guess(std::size_t number, int time) {
+    Place& place = places_[number];
+    const LoadState* before = nullptr;
+    const LoadState* after = nullptr;
+    for (const auto& [known, state] : place.states) {
+        if (known == 0) continue;
+        if (!place.station.states.count(known) && !know_slopes(number, known)) return false;
+        const LoadState& shown = place.station.states.at(known);
+        if (known <= time) before = &shown;
+        else if (!after) after = &shown;
+    }
+    if (!before && !after) return false;
+    if (place.station.states.count(time)) return true;
+    const LoadState* nearest = before ? before : after;
+    const LoadState found = before && after ? between(*before, *after, time_of(time)) : nearest->gone_on(time_of(time));
+    place.station.states[time] = found;
+    place.guessed.insert(time);
+    return true;
+}
+
+void Quasistatic::set_rough(bool rough) {
+    if (rough_ && !rough) forget_guesses();
+    rough_ = rough;
+}
+
+void Quasistatic::forget_guesses() {
+    for (Place& place : places_) {
+        for (const int time : place.guessed) place.station.states.erase(time);
+        place.guessed.clear();
+        place.station.ahead.clear();
+    }
 }
 
 bool Quasistatic::know_slopes(std::size_t number, int time) {
@@ -337,7 +414,7 @@ bool Quasistatic::find(std::size_t number, int time) {
         keep(number, 0, nothing(0.0));
         return true;
     }
-    if (solve_for(place, time)) {
+    if (solve_for(number, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
         return true;
@@ -378,17 +455,14 @@ bool Quasistatic::extend(double now) {
         enter(last);
     } else if (!plan_.linear) {
         time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
-        if (!know(places_.size() - 1, time)) return false;
+        if (!know_exactly(places_.size() - 1, time)) return false;
         enter(last);
         equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time), last.known.at(time).contacts);
     }
     const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
     const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));
-    std::map<int, Known> guess = last.known;
-    for (auto& [time_there, known] : guess)
-        for (const auto& [added, from] : fields) known.displacement.push_back(known.displacement[from]);
     add_place();
-    places_.back().guess = std::move(guess);
+    places_.back().new_fields = fields;
     return !plan_.linear || know_linear(places_.size() - 1);
 }
 
@@ -438,7 +512,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     const auto judge = [&]() -> Critical {
         if (growing_.size() > 1) choose_tip(station, materials);
         const double toughness = mean_toughness(materials, station.route);
-        return {station.critical_time(toughness), toughness};
+        return {station.critical_time(toughness, rough_), toughness};
     };
     const auto fail = [&]() -> Critical {
         failure_ = "no equilibrium was found";
@@ -447,6 +521,13 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     if (plan_.linear) {
         for (const int time : {0, 1, 2}) know_ahead(number, time);
         return judge();
+    }
+    if (rough_) {
+        const Place& further = places_[std::min(number + ahead_, places_.size() - 1)];
+        bool some = false;
+        for (const auto& [time, state] : places_[number].states)
+            if (time > 0 && further.states.count(time)) some = know_ahead(number, time) || some;
+        if (some) return judge();
     }
     int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
     int high = low + 1;

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace crampfit {
@@ -25,12 +26,16 @@ class Quasistatic {
   public:
     /// `scene`, `plan` and `materials` must outlive this.
     /// `numbers`: keys of numbers of the materials by which derivatives are wanted.
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {});
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {},
+                int threads = 1);
     ~Quasistatic();
 
     /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
     /// of each number.
     void shift(const std::vector<double>& by);
+
+    /// From now on states that are not known need not be found where others of the same place are: they follow from these, roughly.
+    void set_rough(bool rough);
 
     /// Follows the crack to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
     /// has reached a free surface, or there is no equilibrium. `now` is how far the load has come [s].
@@ -67,22 +72,28 @@ class Quasistatic {
         Station station;
         std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene
         std::map<int, Known> known;                     // by number of the time
-        std::map<int, Known> guess;                     // the same of the place before, handed on
+        std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, std::vector<LoadState>> slopes;   // [numbers] their derivatives
+        std::set<int> guessed;                          // times at which the station's state is no more than roughly known
     };
 
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers, int threads,
                 const Quasistatic* leader);
     void add_place();
     bool extend(double now);
     void find_route(std::size_t number);
     Vec2 next_tip(const Place& last, const TipLoad& load) const;
     bool know(std::size_t number, int time);
+    bool know_exactly(std::size_t number, int time);
+    bool guess(std::size_t number, int time);
+    void forget_guesses();
     bool find(std::size_t number, int time);
     bool know_linear(std::size_t number);
-    bool solve_for(Place& place, int time);
-    bool solve_from(double potential, double power, double time);
+    bool solve_for(std::size_t number, int time);
+    bool solve_predicted(std::size_t number, int time);
+    std::vector<Vec2> handed_on(std::size_t from, const std::vector<Vec2>& before, std::size_t to) const;
+    bool solve_from(double potential, double power, double from, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);
     void keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes);
@@ -104,6 +115,7 @@ class Quasistatic {
     std::vector<MaterialSlope> numbers_;
     std::vector<double> shift_;                   // [numbers]; empty: none
     std::deque<Place> places_;
+    bool rough_ = false;
     const Place* entered_ = nullptr;              // the one that the equilibrium stands at
     std::vector<std::pair<int, bool>> growing_;   // tips: crack, at its end
     double increment_ = 0;                        // of the crack length between stations [m]

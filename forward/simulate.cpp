@@ -76,7 +76,7 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
 }
 
 Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const SimulateOptions& options) {
-    Quasistatic walk(scene, plan, materials);
+    Quasistatic walk(scene, plan, materials, {}, options.threads);
     const auto go_on = [&](double time, double crack_length) {
         if (options.progress) {
             const double by_time = time / plan.end_time;
