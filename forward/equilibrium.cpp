@@ -29,6 +29,8 @@ constexpr double least_reciprocal_condition = 1e-10;
 // An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
 // as much as a new one.
 constexpr double worth_keeping = 5.0;
+// With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
+constexpr double worth_keeping_with_friction = 0.25;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -405,7 +407,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             settle();
             return Outcome::solved;
         }
-        renew = residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
+        renew = plan_.friction ? residual > worth_keeping_with_friction * before
+              : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
 }

@@ -273,7 +273,10 @@ bool Quasistatic::solve_predicted(std::size_t number, int time) {
     for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
     std::vector<Vec2> predicted = handed_on(before, gone, static_cast<int>(number));
     for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
-    equilibrium_.set_displacements(predicted, time_of(time));
+    Equilibrium::Contacts contacts = from->contacts;
+    for (std::size_t d = 0; d < contacts.moved.size(); ++d)
+        contacts.moved[d] += there.at(time).contacts.moved[d] - there.at(from->time).contacts.moved[d];
+    equilibrium_.set_displacements(predicted, time_of(time), contacts);
     return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
 }
 
