@@ -66,7 +66,7 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
     std::vector<double> mass(fields, 0.0);
     const Points& points = body.points;
     for (int p = 0; p < points.count(); ++p)
-        for (int k = 0; k < 4; ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+        for (int k = 0; k < body.layout.nodes_per_cell(); ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
     return mass;
 }
 
@@ -121,7 +121,7 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
     bool found = false;
     body_.for_cells_near(body_.layout.node_position(node), 0.5 * body_.layout.cell.minCoeff(), [&](int c) {
         for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p) {
-            const auto& fields = body_.points.node[p];
+            const auto fields = body_.points.node[p];
             if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
             const Box domain = body_.domain(p);
             found |= on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high);
@@ -177,7 +177,7 @@ std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std:
     for (const Traction& t : tractions)
         if (t.driver == driver) length += t.facet.length;
     for (const Traction& t : tractions)
-        for (int k = 0; k < 4 && t.driver == driver; ++k)
+        for (int k = 0; k < body_.layout.nodes_per_cell() && t.driver == driver; ++k)
             load[body_.points.node[t.facet.point][k]] += t.facet.length / length * t.facet.weight[k] * direction;
     return load;
 }
@@ -189,7 +189,7 @@ Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacem
     for (const Traction& t : tractions) {
         if (t.driver != driver) continue;
         length += t.facet.length;
-        for (int k = 0; k < 4; ++k)
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
             sum += t.facet.length * t.facet.weight[k] * displacement[body_.points.node[t.facet.point][k]];
     }
     return sum / length;

@@ -127,7 +127,7 @@ void Equilibrium::find_forces() {
 }
 
 // What prescribed components still have to go loads the others.
-GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+GridFactor::Element Equilibrium::element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
     GridFactor::Element made{{}, stiffness};
     for (int a = 0; a < 8; ++a) made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
     for (int b = 0; b < 8; ++b) {
@@ -159,10 +159,10 @@ void Equilibrium::add_points(int c, bool geometric, std::vector<GridFactor::Elem
     int p = points.first_of_cell[c];
     const int last = points.first_of_cell[c + 1];
     while (p < last) {  // points side by side on the same fields go together
-        const std::array<int, 4>& fields = points.node[p];
+        const int q = p;
         Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
-        for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
-        elements.push_back(element(fields, sum));
+        for (; p < last && points.node.same(p, q); ++p) add_point(p, sum);
+        elements.push_back(element(points.node[q], sum));
     }
 }
 
@@ -179,7 +179,7 @@ void Equilibrium::add_pairs() {
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
-        extra_.emplace(cell, element({pair.left, pair.right, -1, -1}, both));
+        extra_.emplace(cell, element(std::array{pair.left, pair.right, -1, -1}, both));
     }
 }
 
@@ -199,7 +199,7 @@ void Equilibrium::add_touches(bool geometric) {
         const Vec2& still_to_go = still_to_go_[sliding_driver_[i]];
         for (const SlidingBody::Touch& touch : sliding_[i].touches(gone, displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
-            const std::array<int, 4>& fields = body_.points.node[facet.point];
+            const auto fields = std::as_const(body_.points).node[facet.point];
             const Mat2 along = touch.normal * touch.normal.transpose();
             const double turning = geometric ? touch.force * touch.curvature : 0.0;
             const Mat2 stiffness = touch.stiffness * along - turning * (Mat2::Identity() - along);

@@ -64,7 +64,7 @@ class Equilibrium {
     /// Everything that growth and solution change, to come back to.
     struct Snapshot {
         CrackFields cracks;
-        std::vector<std::array<int, 4>> node;
+        PointTable<int> node;
         std::vector<Boundary::Held> held;
         std::vector<Vec2> displacement;
         double time;
@@ -77,7 +77,7 @@ class Equilibrium {
     void renumber();
     void find_forces();
     bool factor_tangent(bool geometric);
-    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void add_points(int cell, bool geometric, std::vector<GridFactor::Element>& elements);
     void add_lone_points();
     void add_pairs();

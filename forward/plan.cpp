@@ -42,9 +42,16 @@ void refuse(const Scene& scene, const std::string& key, const std::string& value
 
 void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     const std::string other = quasistatic ? "quasistatic" : "explicit";
-    if (scene.solver.shape_function == ShapeFunction::bspline2 || scene.solver.shape_function == ShapeFunction::cpdi)
-        refuse(scene, "solver.shape_function", scene.solver.shape_function == ShapeFunction::cpdi ? "cpdi" : "bspline2",
-               "not available in this version; use \"auto\", \"gimp\" or \"linear\"");
+    if (quasistatic && scene.solver.shape_function == ShapeFunction::bspline2)
+        refuse(scene, "solver.shape_function", "bspline2",
+               "not available at equilibrium; use \"auto\", \"gimp\", \"cpdi\" or \"linear\", or solver.kind = \"explicit\"");
+    if (quasistatic && scene.solver.velocity_update != VelocityUpdate::automatic)
+        refuse(scene, "solver.velocity_update", "given", "equilibrium has no velocities to update; leave it out");
+    if (quasistatic && scene.solver.stress_update != StressUpdate::last)
+        refuse(scene, "solver.stress_update", "given", "equilibrium has no time step; leave it out");
+    if (quasistatic && !scene.specimen.parts.empty())
+        refuse(scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
+               "parts that move on their own are for explicit dynamics; give solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.damping > 0.0)
         refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping), "equilibrium has no motion to damp; leave it out");
     int tips = 0;
@@ -81,7 +88,7 @@ double highest_frequency_squared(const Discretisation& body) {
     std::vector<double> widest;
     for (const CellWeights& w : body.weights) {
         spread.emplace_back(Eigen::Matrix3d::Zero());
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < body.layout.nodes_per_cell(); ++k) {
             Eigen::Matrix<double, 3, 2> B;
             B << w.slope_x[k], 0, 0, w.slope_y[k], w.slope_y[k], w.slope_x[k];
             spread.back() += B * B.transpose() / w.value[k];
@@ -98,6 +105,10 @@ double highest_frequency_squared(const Discretisation& body) {
         highest = std::max(highest, largest(root * spread[slot] * root) / density);
     }
     return highest;
+}
+
+std::string name_of(ShapeFunction kind) {
+    return kind == ShapeFunction::linear ? "linear" : kind == ShapeFunction::cpdi ? "CPDI" : "GIMP";
 }
 
 double speed_of(const Edge& edge) { return std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)); }
@@ -124,6 +135,8 @@ double farthest_motion(const Scene& scene, double end) {
     };
     std::for_each(scene.edges.begin(), scene.edges.end(), consider);
     std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
+    for (const Part& part : scene.specimen.parts)
+        if (!part.velocity.isZero(0.0)) farthest = std::max(farthest, part.velocity.norm() * end);
     return farthest;
 }
 
@@ -161,6 +174,32 @@ Travel travel_of(const Scene& scene) {
     if (travel.fastest > 0.0) travel.until = last;
     travel.together = travel.fastest == 0.0 || first == last;
     return travel;
+}
+
+// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A / mu,
+// against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
+void choose_updates(const Scene& scene, Plan& plan) {
+    const SolverChoice& solver = scene.solver;
+    std::string how = "kept by the grid";
+    std::string why = "points stay in their cells: mapping to points and back would only lose";
+    if (solver.velocity_update != VelocityUpdate::automatic) why = "asked for in solver.velocity_update";
+    switch (solver.velocity_update) {
+        case VelocityUpdate::automatic: break;
+        case VelocityUpdate::flip: how = fmt::format("FLIP, {:g} of it PIC", solver.pic_share); break;
+        case VelocityUpdate::pic:
+            how = "PIC, time step shorter by the root of 2";
+            plan.time_step /= std::sqrt(2.0);
+            break;
+        case VelocityUpdate::xpic: how = fmt::format("XPIC({})", solver.order); break;
+        case VelocityUpdate::fmpm:
+            how = fmt::format("FMPM({}), time step shorter by the root of twice its order", solver.order);
+            plan.time_step /= std::sqrt(2.0 * solver.order);
+            break;
+    }
+    plan.choices.push_back({"velocities", how, why});
+    if (solver.stress_update != StressUpdate::last)
+        plan.choices.push_back({"stresses", solver.stress_update == StressUpdate::first ? "updated first" : "updated first and last by half a step each",
+                                "asked for in solver.stress_update"});
 }
 
 } // namespace
@@ -215,8 +254,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                           : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
-    choose("shape function", scene.solver.shape_function == ShapeFunction::linear ? "linear" : "GIMP",
-           "in the undeformed specimen a point's domain lies in one cell, where linear and GIMP weights are the same");
+    if (scene.solver.shape_function == ShapeFunction::bspline2)
+        choose("shape function", "quadratic B-splines, knots threefold at the specimen's sides", "asked for");
+    else
+        choose("shape function", name_of(scene.solver.shape_function),
+               "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
     choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
            fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
                        expected / smallest, most_rotation));
@@ -233,13 +275,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "every second step at each growing tip", "domain form, 4 cells around the tip");
     plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
+    const bool parts_touch = scene.specimen.parts.size() > 1;
+    if (parts_touch) choose("parts", fmt::format("{}, which push on one another without friction", scene.specimen.parts.size()), "given in specimen.parts");
     choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
     if (plan.quasistatic) return plan;
 
     const double highest = highest_frequency_squared(body);
-    plan.added_frequency_squared = plan.contact || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
+    plan.added_frequency_squared = plan.contact || parts_touch || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
+    choose_updates(scene, plan);
     return plan;
 }
 
