@@ -40,6 +40,11 @@ void refuse(const Scene& scene, const std::string& key, const std::string& value
     throw InputError(scene.file.string(), key, value, rule);
 }
 
+bool starts_in_motion(const Scene& scene) {
+    const auto& parts = scene.specimen.parts;
+    return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return !part.velocity.isZero(0.0); });
+}
+
 void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     const std::string other = quasistatic ? "quasistatic" : "explicit";
     if (quasistatic && scene.solver.shape_function == ShapeFunction::bspline2)
@@ -49,9 +54,9 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
         refuse(scene, "solver.velocity_update", "given", "equilibrium has no velocities to update; leave it out");
     if (quasistatic && scene.solver.stress_update != StressUpdate::last)
         refuse(scene, "solver.stress_update", "given", "equilibrium has no time step; leave it out");
-    if (quasistatic && !scene.specimen.parts.empty())
+    if (quasistatic && (starts_in_motion(scene) || scene.specimen.parts.size() > 1))
         refuse(scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
-               "parts that move on their own are for explicit dynamics; give solver.kind = \"explicit\"");
+               "parts that start with a velocity or push on one another are for explicit dynamics; give solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.damping > 0.0)
         refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping), "equilibrium has no motion to damp; leave it out");
     int tips = 0;
@@ -96,13 +101,24 @@ double highest_frequency_squared(const Discretisation& body) {
         widest.push_back(largest(spread.back()));
     }
     double highest = 0.0;
-    for (int p = 0; p < body.points.count(); ++p) {
+    int last = -1;  // a point of the cell that was looked at last
+    for (int c = 0; c < body.layout.cells(); ++c) {
+        const int p = body.points.first_of_cell[c];
+        if (p == body.points.first_of_cell[c + 1]) continue;
         const double density = body.points.density(p);
-        const int slot = body.points.slot[p];
+        const int first_slot = body.points.slot[p] - body.place_of(p);
+        const auto alike = [&](int q) {
+            return body.points.stiffness[body.points.cell[q]] == body.points.stiffness[c] && body.points.density(q) == density &&
+                   body.points.slot[q] - body.place_of(q) == first_slot;
+        };
+        if (last >= 0 && alike(last)) continue;
+        last = p;
         const Eigen::Matrix3d C = body.points.stiffness_of(p);
-        if (C.trace() * widest[slot] / density <= highest) continue;  // a bound: spares most points the eigenvalues
-        const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(C).operatorSqrt();
-        highest = std::max(highest, largest(root * spread[slot] * root) / density);
+        for (int slot = first_slot; slot < first_slot + body.layout.points_per_cell(); ++slot) {
+            if (C.trace() * widest[slot] / density <= highest) continue;  // a bound: spares most cells the eigenvalues
+            const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(C).operatorSqrt();
+            highest = std::max(highest, largest(root * spread[slot] * root) / density);
+        }
     }
     return highest;
 }
@@ -222,7 +238,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.still_from = travel.until;
     for (const Crack& crack : scene.cracks) plan.grows |= crack.grows != Growth::none;
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && plan.slowness > slow_loading && scene.solver.damping == 0.0);
+                       (scene.solver.kind == SolverKind::automatic && plan.slowness > slow_loading && scene.solver.damping == 0.0 &&
+                        !starts_in_motion(scene));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
 
     const double smallest = scene.specimen.size.minCoeff();
