@@ -151,6 +151,13 @@ void Boundary::place_tractions() {
             if (!on_side(body_.layout, edge.side, facet.position) || !in_range(body_.layout, edge, facet.position)) continue;
             ++found;
             tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, e});
+            if (body_.layout.degree == 1) continue;
+            // B-splines are integrated along the side by the points' own places, as the stress that holds against it is.
+            const Box domain = body_.domain(facet.point);
+            const int axis = edge.side == Side::top || edge.side == Side::bottom ? 0 : 1;
+            Vec2 place = facet.position;
+            place[axis] = 0.5 * (domain.low[axis] + domain.high[axis]);
+            tractions.back().facet.weight = body_.values_at(body_.points.cell[facet.point], place);
         }
         if (found == 0)
             throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no material lies on this stretch of the side");
