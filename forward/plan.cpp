@@ -255,6 +255,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         refuse(scene, "stop", "crack_length alone", "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
+        : starts_in_motion(scene) ? "a part starts in motion"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
