@@ -40,8 +40,8 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     place_bodies();
 }
 
-// How far velocities stand behind displacements between steps, in steps. What the nodes move with before the forces of a step, they
-// move with by as much less after them.
+// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its forces
+// are found, and by the rest after them.
 double ExplicitSolver::lag() const {
     switch (scene_.solver.stress_update) {
         case StressUpdate::first: return -0.5;
@@ -79,7 +79,8 @@ void ExplicitSolver::surface_forces() {
     }
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        reaction_[driver] = sliding_[i].push(moved(driver), displacement_, force_);
+        const double now = time_ + (0.5 - lag()) * plan_.time_step;
+        reaction_[driver] = sliding_[i].push(boundary_.moved(driver, now, displacement_), displacement_, force_);
         books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver, time_, time_ + plan_.time_step));
     }
     if (part_contact_) part_contact_->push(displacement_, force_);
@@ -184,7 +185,7 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
 
 EnergyBooks ExplicitSolver::energies() const {
     // As of the last forces: half of the product of velocities before and after them with the strain energy is what a leapfrog
-    // keeps (Hairer, Lubich and Wanner 2003, section 1), exactly so where forces are linear.
+    // keeps (Hairer, Lubich and Wanner 2003), exactly so where forces are linear.
     EnergyBooks books = books_;
     const double since = time_ > 0.0 ? (0.5 + lag()) * plan_.time_step : 0.0;
     std::vector<Vec2> there = displacement_;

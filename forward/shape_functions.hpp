@@ -40,7 +40,7 @@ struct CellWeights {
 };
 
 /// At `place` in the cell (from its lower left corner, [m]) for a point whose domain has half widths `half`. CPDI: the hats averaged
-/// over the corners of the domain, as a parallelogram (Sadeghirad, Brannon and Burghardt 2011, eq. 22-23).
+/// over the corners of the domain, as a parallelogram (Sadeghirad, Brannon and Burghardt 2011).
 CellWeights cell_weights(ShapeFunction kind, const Vec2& place, const Vec2& cell, const Vec2& half,
                          const std::array<CellEnds, 2>& ends = {});
 

@@ -13,7 +13,7 @@ namespace crampfit {
 ///     XPIC(m)  w - (1 - A)^m w + a dt;                                                   nodes move with A w
 ///     FMPM(m)  (1 + (1 - A) + ... + (1 - A)^(m-1)) (A w + a dt);                         nodes move with w
 ///     PIC      FMPM(1)
-/// (Hammerquist and Nairn 2017, section 2.3; Nairn and Hammerquist 2021, section 2; there S+ S is what A is here.) Nodes whose velocity
+/// (Hammerquist and Nairn 2017; Nairn and Hammerquist 2021; there S+ S is what A is here.) Nodes whose velocity
 /// is prescribed keep it in the sums. On an undeformed grid none of this is needed: see ExplicitSolver.
 class VelocityMapping {
   public:
