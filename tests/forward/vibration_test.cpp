@@ -234,10 +234,7 @@ Scene two_disks() {
     return scene;
 }
 
-TEST(VerificationDisks, GiveBackTheEnergyOfTheirImpact) {
-    const Way ways[] = {plain, splines, {"flip", ShapeFunction::automatic, VelocityUpdate::flip},
-                        {"xpic(2)", ShapeFunction::automatic, VelocityUpdate::xpic, 2},
-                        {"fmpm(4)", ShapeFunction::automatic, VelocityUpdate::fmpm, 4}};
+void expect_bounce(const std::vector<Way>& ways, double most_lost) {
     for (const Way& way : ways) {
         const Record record = simulate(way.of(two_disks()));
         ASSERT_EQ(record.status, RunStatus::finished) << record.message;
@@ -249,9 +246,17 @@ TEST(VerificationDisks, GiveBackTheEnergyOfTheirImpact) {
                     100 * last.kinetic_energy / first.kinetic_energy, 100 * least / first.kinetic_energy, 100 * record.worst_energy_imbalance,
                     record.seconds);
         EXPECT_LT(least, 0.2 * first.kinetic_energy);  // they did meet
-        EXPECT_LT(lost, way.update == VelocityUpdate::xpic ? 0.05 : 0.0186) << way.name;
+        EXPECT_LT(lost, most_lost) << way.name;
         EXPECT_LT(record.worst_energy_imbalance, 0.01) << way.name;
     }
+}
+
+TEST(VerificationDisks, GiveBackTheEnergyOfTheirImpact) { expect_bounce({plain, splines}, 0.0186); }
+
+TEST(SlowDisks, LoseLittleWhenVelocitiesGoThroughThePoints) {
+    expect_bounce({{"flip", ShapeFunction::automatic, VelocityUpdate::flip}, {"fmpm(4)", ShapeFunction::automatic, VelocityUpdate::fmpm, 4}}, 0.0186);
+    // A filter that takes (1 - A)^2 of the velocities each of 4000 steps misses the bar for the best published, as FLIP there does (3.23 %).
+    expect_bounce({{"xpic(2)", ShapeFunction::automatic, VelocityUpdate::xpic, 2}}, 0.0323);
 }
 
 TEST(UnitParts, KeepTheirMomentumWhenTheyMeet) {
