@@ -51,6 +51,26 @@ void step_wood(benchmark::State& state, bool crack) {
 void wood_without_crack(benchmark::State& state) { step_wood(state, false); }
 void wood_with_crack_and_J(benchmark::State& state) { step_wood(state, true); }
 
+// A block of earlywood that one side pulls, in finite rotation: cells a side, threads.
+void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate update) {
+    Scene scene = wood(static_cast<int>(state.range(0)), false);
+    scene.specimen.rings.reset();
+    scene.specimen.material = "EW";
+    scene.solver.shape_function = shape;
+    scene.solver.velocity_update = update;
+    const MaterialMap materials(scene);
+    Discretisation body(scene, materials);
+    const Plan plan = make_plan(scene, materials, body);
+    ExplicitSolver solver(scene, plan, materials, body, static_cast<int>(state.range(1)));
+    for (auto _ : state) solver.step();
+    state.SetItemsProcessed(state.iterations() * body.points.count());
+    state.counters["points"] = body.points.count();
+}
+
+BENCHMARK_CAPTURE(elastic_block, gimp, ShapeFunction::gimp, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
+BENCHMARK_CAPTURE(elastic_block, splines, ShapeFunction::bspline2, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
+BENCHMARK_CAPTURE(elastic_block, flip, ShapeFunction::gimp, VelocityUpdate::flip)->Args({500, 1})->UseRealTime();
+BENCHMARK_CAPTURE(elastic_block, xpic2, ShapeFunction::gimp, VelocityUpdate::xpic)->Args({500, 1})->UseRealTime();
 BENCHMARK(wood_without_crack)->Arg(46)->Arg(92)->Arg(184);
 BENCHMARK(wood_with_crack_and_J)->Arg(46)->Arg(92)->Arg(184);
 

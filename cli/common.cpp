@@ -26,7 +26,7 @@ void add_common_options(CLI::App& command, CommonOptions& common) {
         .add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
-    command.add_option("--threads", common.threads, "Forward runs side by side in a fit, all cores unless told; one simulation uses one core")
+    command.add_option("--threads", common.threads, "Forward runs side by side in a fit, or threads in a step of explicit dynamics; all cores unless told")
         ->type_name("N")
         ->check(CLI::Range(1, most_threads));
     command.add_flag("--quiet", common.quiet, "No progress on standard error");

@@ -36,6 +36,7 @@ Record run(const Scene& scene, const CommonOptions& common) {
     SimulateOptions options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();
+    options.threads = common.threads;
     options.progress = [&](const Progress& progress) {
         line.show(progress.fraction, progress.step,
                   fmt::format("at {:.4g} ms, crack {:.4g} mm", 1e3 * progress.time, 1e3 * progress.crack_length));
@@ -53,6 +54,8 @@ ExitStatus simulate_and_save(const Arguments& arguments, const CommonOptions& co
     write(record, arguments.output);
     report(common, fmt::format("{}: {}; {} points, {} steps in {}, saved as {}", name(record.status), record.message,
                                record.points, record.steps, duration_text(record.seconds), arguments.output.string()));
+    if (const double share = kinetic_share(record); share > quasistatic_share)
+        report(common, fmt::format("not quasi-static: the kinetic energy was up to {:.2g} times the strain energy", share));
     return exit_status(record.status);
 }
 

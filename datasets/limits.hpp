@@ -54,6 +54,7 @@ inline constexpr NumberRule force = finite(dimension::force);
 inline constexpr NumberRule until = positive(dimension::time);
 inline constexpr NumberRule friction = not_negative(dimension::number);
 inline constexpr NumberRule advance = not_negative(dimension::length);
+inline constexpr NumberRule share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
 inline constexpr NumberRule damping = not_negative(dimension::rate);
 }  // namespace limits
 

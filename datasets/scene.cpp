@@ -1,6 +1,7 @@
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
 #include "datasets/keys.hpp"
+#include "datasets/limits.hpp"
 #include "datasets/scene_parts.hpp"
 #include "datasets/text_file.hpp"
 #include "datasets/toml_reader.hpp"
@@ -58,6 +59,11 @@ std::string default_measure(const Scene& scene, const std::vector<std::string>& 
     return names.front();
 }
 
+bool moves_at_start(const Scene& scene) {
+    const auto& parts = scene.specimen.parts;
+    return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return !part.velocity.isZero(0.0); });
+}
+
 Measure read_measure(const Scene& scene, const Entry& root) {
     const std::vector<std::string> names = check_names(scene, root);
     const auto measure = root.find("measure");
@@ -67,6 +73,9 @@ Measure read_measure(const Scene& scene, const Entry& root) {
     const auto measured = [&](const char* key) {
         const auto entry = measure ? measure->find(key) : std::nullopt;
         if (!entry) {
+            if (names.empty() && moves_at_start(scene)) {
+                return std::string();
+            }
             if (names.empty()) {
                 throw InputError(scene.file.string(), std::string("measure.") + key, "(missing)",
                                  "there is no edge and no body: nothing loads the specimen");
@@ -111,8 +120,40 @@ Model read_model(const Entry& entry) {
     return model;
 }
 
+namespace {
+
+/// How an explicit step updates velocities and stresses.
+void read_updates(const Entry& entry, SolverChoice& solver) {
+    constexpr int highest_order = 100;
+    if (const auto update = entry.find("velocity_update")) {
+        solver.velocity_update = update->choice<VelocityUpdate>({{"auto", VelocityUpdate::automatic},
+                                                                 {"flip", VelocityUpdate::flip},
+                                                                 {"pic", VelocityUpdate::pic},
+                                                                 {"xpic", VelocityUpdate::xpic},
+                                                                 {"fmpm", VelocityUpdate::fmpm}});
+    }
+    if (const auto order = entry.find("order")) {
+        if (solver.velocity_update != VelocityUpdate::xpic && solver.velocity_update != VelocityUpdate::fmpm) {
+            order->fail("belongs to velocity_update = \"xpic\" or \"fmpm\"");
+        }
+        solver.order = order->integer(1, highest_order);
+    }
+    if (const auto share = entry.find("pic_share")) {
+        if (solver.velocity_update != VelocityUpdate::flip) {
+            share->fail("belongs to velocity_update = \"flip\"");
+        }
+        solver.pic_share = share->number(limits::share);
+    }
+    if (const auto stress = entry.find("stress_update")) {
+        solver.stress_update = stress->choice<StressUpdate>(
+            {{"first", StressUpdate::first}, {"last", StressUpdate::last}, {"average", StressUpdate::average}});
+    }
+}
+
+}  // namespace
+
 SolverChoice read_solver(const Entry& entry) {
-    entry.only({"kind", "shape_function", "damping", "extrapolate"});
+    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "damping", "extrapolate"});
     SolverChoice solver;
     if (const auto kind = entry.find("kind")) {
         solver.kind = kind->choice<SolverKind>({{"auto", SolverKind::automatic},
@@ -126,6 +167,7 @@ SolverChoice read_solver(const Entry& entry) {
                                                               {"bspline2", ShapeFunction::bspline2},
                                                               {"cpdi", ShapeFunction::cpdi}});
     }
+    read_updates(entry, solver);
     if (const auto extrapolate = entry.find("extrapolate")) {
         solver.extrapolate = extrapolate->boolean();
     }
@@ -194,6 +236,9 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file, co
         scene.solver = read_solver(*solver);
     }
     scene.stop = read_stop(root.at("stop"));
+    if (scene.measure.displacement.empty() && !scene.stop.time) {
+        root.at("stop").fail("without an edge or a body that moves the run ends by time alone: give time");
+    }
     if (const auto output = root.find("output")) {
         scene.output = read_output(*output);
     }

@@ -77,9 +77,16 @@ struct DensityExponents {
     std::optional<double> toughness;
 };
 
+/// A piece of the specimen that is on its own.
+struct Part {
+    Shape shape;
+    Vec2 velocity = Vec2::Zero();  // at the start [m/s]
+};
+
 struct SpecimenPlan {
     Vec2 size = Vec2::Zero();        // lower left corner at the origin [m]
     std::vector<Shape> cutouts;
+    std::vector<Part> parts;         // empty: all of the rectangle is one piece at rest; else nothing of it lies outside them
     std::string material;            // one of `material`, `rings`, `picture`, `file` is set
     std::optional<Rings> rings;
     std::optional<Picture> picture;
@@ -175,9 +182,16 @@ struct Measure {
 enum class SolverKind { automatic, explicit_dynamics, quasistatic };
 enum class ShapeFunction { automatic, linear, gimp, bspline2, cpdi };
 
+enum class VelocityUpdate { automatic, flip, pic, xpic, fmpm };  // automatic: the grid keeps its velocities
+enum class StressUpdate { first, last, average };
+
 struct SolverChoice {
     SolverKind kind = SolverKind::automatic;
     ShapeFunction shape_function = ShapeFunction::automatic;
+    VelocityUpdate velocity_update = VelocityUpdate::automatic;
+    int order = 2;            // of XPIC and FMPM
+    double pic_share = 0.0;   // of PIC in FLIP, 0..1
+    StressUpdate stress_update = StressUpdate::last;
     bool extrapolate = true;  // equilibrium: a second grid, twice as coarse, takes off most of the grid's error
     double damping = 0.0;   // mass-proportional, force = -damping * mass * velocity [1/s]
 };

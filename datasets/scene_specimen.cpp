@@ -244,8 +244,22 @@ Shape read_shape(const Entry& parent) {
     return parent.has("circle") ? Shape(read_circle(parent.at("circle"))) : Shape(read_polygon(parent.at("polygon")));
 }
 
+namespace {
+
+Part read_part(const Entry& entry) {
+    entry.only({"polygon", "circle", "velocity"});
+    Part part{read_shape(entry)};
+    if (const auto velocity = entry.find("velocity")) {
+        const std::vector<Entry> components = velocity->list(2, "two velocities, such as [\"10 m/s\", \"0 m/s\"]");
+        part.velocity = {components[0].number(limits::velocity), components[1].number(limits::velocity)};
+    }
+    return part;
+}
+
+}  // namespace
+
 SpecimenPlan read_specimen_plan(const Entry& specimen, const Materials& materials) {
-    specimen.only({"size", "cutouts", "material", "rings", "image", "file", "pixel", "offset", "rotation", "classes",
+    specimen.only({"size", "cutouts", "parts", "material", "rings", "image", "file", "pixel", "offset", "rotation", "classes",
                    "orientation", "between", "radial", "pith", "density_exponents"});
     SpecimenPlan plan;
     const std::vector<Entry> size = specimen.at("size").list(2, "two lengths, such as [\"10 mm\", \"10 mm\"]");
@@ -254,6 +268,11 @@ SpecimenPlan read_specimen_plan(const Entry& specimen, const Materials& material
         for (const Entry& cutout : cutouts->list()) {
             cutout.only({"polygon", "circle"});
             plan.cutouts.push_back(read_shape(cutout));
+        }
+    }
+    if (const auto parts = specimen.find("parts")) {
+        for (const Entry& part : parts->list()) {
+            plan.parts.push_back(read_part(part));
         }
     }
     const std::string source = specimen_source(specimen);

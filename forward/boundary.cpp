@@ -69,7 +69,7 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
     std::vector<double> mass(fields, 0.0);
     const Points& points = body.points;
     for (int p = 0; p < points.count(); ++p)
-        for (int k = 0; k < 4; ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+        for (int k = 0; k < body.layout.nodes_per_cell(); ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
     return mass;
 }
 
@@ -124,7 +124,7 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
     bool found = false;
     body_.for_cells_near(body_.layout.node_position(node), 0.5 * body_.layout.cell.minCoeff(), [&](int c) {
         for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p) {
-            const auto& fields = body_.points.node[p];
+            const auto fields = body_.points.node[p];
             if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
             const Box domain = body_.domain(p);
             found |= on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high);
@@ -154,6 +154,13 @@ void Boundary::place_tractions() {
             if (!on_side(body_.layout, edge.side, facet.position) || !in_range(body_.layout, edge, facet.position)) continue;
             ++found;
             tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, e});
+            if (body_.layout.degree == 1) continue;
+            // B-splines are integrated along the side by the points' own places, as the stress that holds against it is.
+            const Box domain = body_.domain(facet.point);
+            const int axis = edge.side == Side::top || edge.side == Side::bottom ? 0 : 1;
+            Vec2 place = facet.position;
+            place[axis] = 0.5 * (domain.low[axis] + domain.high[axis]);
+            tractions.back().facet.weight = body_.values_at(body_.points.cell[facet.point], place);
         }
         if (found == 0)
             throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no material lies on this stretch of the side");
@@ -185,7 +192,7 @@ std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std:
     for (const Traction& t : tractions)
         if (t.driver == driver) length += t.facet.length;
     for (const Traction& t : tractions)
-        for (int k = 0; k < 4 && t.driver == driver; ++k)
+        for (int k = 0; k < body_.layout.nodes_per_cell() && t.driver == driver; ++k)
             load[body_.points.node[t.facet.point][k]] += t.facet.length / length * t.facet.weight[k] * direction;
     return load;
 }
@@ -197,7 +204,7 @@ Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacem
     for (const Traction& t : tractions) {
         if (t.driver != driver) continue;
         length += t.facet.length;
-        for (int k = 0; k < 4; ++k)
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
             sum += t.facet.length * t.facet.weight[k] * displacement[body_.points.node[t.facet.point][k]];
     }
     return sum / length;

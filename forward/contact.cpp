@@ -68,12 +68,12 @@ void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_f
     };
     std::vector<double> added(mass.size(), 0.0);
     for (std::size_t i = 0; i < stiffness_.size(); ++i)
-        for (int k = 0; k < 4; ++k) added[points.node[body_.facets[i].point][k]] += added_by(i, k);
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) added[points.node[body_.facets[i].point][k]] += added_by(i, k);
     // A facet on a node with hardly any mass must not shorten the time step.
     for (std::size_t i = 0; i < stiffness_.size(); ++i) {
         const Facet& f = body_.facets[i];
         double least = 1.0;
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) {
             const int n = points.node[f.point][k];
             if (f.weight[k] == 0.0 || added[n] <= most_frequency_squared * mass[n]) continue;
             least = std::min(least, most_frequency_squared * mass[n] / added[n]);
@@ -84,7 +84,7 @@ void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_f
 
 Vec2 SlidingBody::current(const Facet& facet, const std::vector<Vec2>& displacement) const {
     Vec2 x = facet.position;
-    for (int k = 0; k < 4; ++k) x += facet.weight[k] * displacement[body_.points.node[facet.point][k]];
+    for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) x += facet.weight[k] * displacement[body_.points.node[facet.point][k]];
     return x;
 }
 
@@ -195,7 +195,7 @@ Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement,
     for (const Touch& touch : pushed_) {
         const Facet& facet = body_.facets[touch.facet];
         const Vec2 push = touch.force * touch.normal + touch.drag.force;
-        for (int k = 0; k < 4; ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) force[body_.points.node[facet.point][k]] += facet.weight[k] * push;
         total += push;
         stored_energy_ += touch.energy + touch.drag.energy;
         sliding_now_ += touch.drag.dissipated;

@@ -19,7 +19,10 @@ constexpr double pair_compliance = 4.2;
 // A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip
 // field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against the
 // exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
-constexpr double tip_lag = 0.25;
+constexpr double tip_lag_of_hats = 0.25;
+constexpr double tip_lag_of_splines = 0.37;
+
+double tip_lag(const Layout& layout) { return layout.degree == 1 ? tip_lag_of_hats : tip_lag_of_splines; }
 
 // A tip that comes nearer to another crack than this part of a cell has met it.
 constexpr double meeting_distance = 0.5;
@@ -91,7 +94,8 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
     node_of_field.resize(body.layout.nodes());
     for (int n = 0; n < body.layout.nodes(); ++n) node_of_field[n] = n;
     if (scene.cracks.empty()) return;
-    mask_.assign(body.points.count(), {});
+    mask_ = PointTable<std::uint8_t>(body.layout.nodes_per_cell());
+    mask_.resize(body.points.count());
     for (const Crack& crack : scene.cracks) {
         CrackLine line;
         line.points = crack.points;
@@ -216,7 +220,7 @@ bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
 
 double CrackFields::freed(int crack, int node) const {
     const Vec2 x = body_->layout.node_position(node);
-    const Box support{x - body_->layout.cell, x + body_->layout.cell};
+    const Box support = body_->layout.support(node);
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
         if (!exit_distance(tip->position, tip->direction, support)) continue;
@@ -228,7 +232,7 @@ double CrackFields::freed(int crack, int node) const {
         // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
         // and would free the nodes far off an oblique crack too early.
         const Vec2 cell_along = tip->direction.cwiseProduct(body_->layout.cell);
-        const double ahead = (x - tip->position).dot(tip->direction) + tip_lag * cell_along.norm();
+        const double ahead = (x - tip->position).dot(tip->direction) + tip_lag(body_->layout) * cell_along.norm();
         least = std::min(least, 0.5 - ahead / cell_along.lpNorm<1>());
     }
     return std::max(0.0, least);
@@ -239,8 +243,8 @@ void CrackFields::sort_points(int crack, const Box& window) {
     Points& points = body_->points;
     const std::uint8_t bit = static_cast<std::uint8_t>(1u << crack);
     body_->for_cells_in(window, [&](int c) {
-        const std::array<int, 4> nodes = layout.cell_nodes(c);
-        for (int k = 0; k < 4; ++k) {
+        const auto nodes = layout.cell_nodes(c);
+        for (int k = 0; k < layout.nodes_per_cell(); ++k) {
             const bool node_left = is_left(crack, layout.node_position(nodes[k]));
             const bool split = freed(crack, nodes[k]) >= least_freed_;
             for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
@@ -277,7 +281,7 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         const int other = other_mask == 0 ? node : known->second;
         // The wood that counts is where the tip is, on the way, when it frees the pair.
         const bool at_end = (x - lines[k].end.position).squaredNorm() <= (x - lines[k].start.position).squaredNorm();
-        const Vec2 on_the_way = x + tip_lag * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
+        const Vec2 on_the_way = x + tip_lag(body_->layout) * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
         const Vec2 along = lines[k].tip(at_end).direction;
         const double plane_modulus = opening_modulus(*materials_, on_the_way, 0.5 * body_->layout.cell, along);
         const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
@@ -323,13 +327,13 @@ Box CrackFields::window(const Vec2& from, const Vec2& to) const {
 Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_->layout;
     const int c = layout.cell_at(x);
-    const std::array<int, 4> nodes = layout.cell_nodes(c);
-    const CellWeights weights = cell_weights(ShapeFunction::linear, x - layout.cell_corner(c), layout.cell, {});
+    const auto nodes = layout.cell_nodes(c);
+    const auto values = body_->values_at(c, x);
     Vec2 jump = Vec2::Zero();
     for (const FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
-        for (int k = 0; k < 4; ++k)
-            if (pair.node == nodes[k]) jump += weights.value[k] * (displacement[pair.left] - displacement[pair.right]);
+        for (int k = 0; k < layout.nodes_per_cell(); ++k)
+            if (pair.node == nodes[k]) jump += values[k] * (displacement[pair.left] - displacement[pair.right]);
     }
     return jump;
 }

@@ -104,7 +104,7 @@ class CrackFields {
     Discretisation* body_;
     const MaterialMap* materials_;
     double least_freed_;
-    std::vector<std::array<std::uint8_t, 4>> mask_;     // [points] bit k: crack k lies between the point and the cell's node
+    PointTable<std::uint8_t> mask_;      // [points] bit k: crack k lies between the point and the cell's node
     std::map<std::pair<int, unsigned>, int> field_of_;  // node and mask to field, for masks above 0
     std::vector<NewField> new_fields_;
 };

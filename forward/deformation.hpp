@@ -140,8 +140,9 @@ std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>
 inline Mat2 gradient_at(const Discretisation& body, int p, const std::vector<Vec2>& field) {
     const CellWeights& w = body.weights[body.points.slot[p]];
     Mat2 gradient = Mat2::Zero();
-    for (int k = 0; k < 4; ++k) {
-        const Vec2& u = field[body.points.node[p][k]];
+    const auto node = body.points.node[p];
+    for (std::size_t k = 0; k < node.size(); ++k) {
+        const Vec2& u = field[node[k]];
         gradient.col(0) += w.slope_x[k] * u;
         gradient.col(1) += w.slope_y[k] * u;
     }
@@ -151,7 +152,8 @@ inline Mat2 gradient_at(const Discretisation& body, int p, const std::vector<Vec
 inline Vec2 value_at(const Discretisation& body, int p, const std::vector<Vec2>& field) {
     const CellWeights& w = body.weights[body.points.slot[p]];
     Vec2 value = Vec2::Zero();
-    for (int k = 0; k < 4; ++k) value += w.value[k] * field[body.points.node[p][k]];
+    const auto node = body.points.node[p];
+    for (std::size_t k = 0; k < node.size(); ++k) value += w.value[k] * field[node[k]];
     return value;
 }
 

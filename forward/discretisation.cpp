@@ -13,27 +13,27 @@ namespace {
 // A point that cutouts leave less of than this is left out: next to nothing would hold what pushes on it.
 constexpr double least_share = 0.02;
 
-// What cutouts leave of an upright rectangle.
+// What cutouts and parts leave of an upright rectangle.
 struct Remainder {
     double share;  // of its area
     Vec2 middle;   // [m]
 };
 
-class Cutouts {
+class Extent {
   public:
-    explicit Cutouts(const std::vector<Shape>& shapes) : shapes_(shapes) {
-        for (const Shape& shape : shapes) boxes_.push_back(bounds(shape));
+    explicit Extent(const SpecimenPlan& specimen) : specimen_(specimen), outlines_(specimen.cutouts) {
+        for (const Part& part : specimen.parts) outlines_.push_back(part.shape);
+        for (const Shape& shape : outlines_) boxes_.push_back(bounds(shape));
     }
 
     Remainder leave_of(const Box& box) const {
         std::vector<const Shape*> near;
         const Vec2 centre = 0.5 * (box.low + box.high);
         const Vec2 size = box.high - box.low;
-        for (std::size_t k = 0; k < shapes_.size(); ++k)
-            if (boxes_[k].touches(box)) near.push_back(&shapes_[k]);
-        const auto takes = [&](const Vec2& x) {
-            return std::any_of(near.begin(), near.end(), [&](const Shape* s) { return inside(*s, x); });
-        };
+        for (std::size_t k = 0; k < outlines_.size(); ++k)
+            if (boxes_[k].touches(box)) near.push_back(&outlines_[k]);
+        const auto takes = [&](const Vec2& x) { return !has_wood(specimen_, x); };
+        if (near.empty()) return {specimen_.parts.empty() ? 1.0 : 0.0, centre};
         const bool crossed = std::any_of(near.begin(), near.end(), [&](const Shape* s) {
             return nearest_on_outline(*s, centre).distance < 0.5 * size.norm();
         });
@@ -53,9 +53,17 @@ class Cutouts {
     }
 
   private:
-    const std::vector<Shape>& shapes_;
+    const SpecimenPlan& specimen_;
+    std::vector<Shape> outlines_;  // of cutouts and parts
     std::vector<Box> boxes_;
 };
+
+int part_at(const std::vector<Part>& parts, const Vec2& x) {
+    const auto distance = [&](const Part& part) { return inside(part.shape, x) ? 0.0 : nearest_on_outline(part.shape, x).distance; };
+    return static_cast<int>(std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {
+                                return distance(a) < distance(b);
+                            }) - parts.begin());
+}
 
 // Stress zz per stress xx, yy, xy in plane strain.
 Eigen::Vector3d stress_out_of_plane(const LocalWood& wood) {
@@ -76,6 +84,7 @@ Layout Layout::of(const Scene& scene) {
     layout.cells_x = count(scene.specimen.size.x());
     layout.cells_y = count(scene.specimen.size.y());
     layout.cell = {scene.specimen.size.x() / layout.cells_x, scene.specimen.size.y() / layout.cells_y};
+    layout.degree = scene.solver.shape_function == ShapeFunction::bspline2 ? 2 : 1;
     layout.per_side = static_cast<int>(std::lround(std::sqrt(scene.model.points_per_cell)));
     layout.thickness = scene.model.thickness;
     return layout;
@@ -87,19 +96,54 @@ int Layout::cell_at(const Vec2& x) const {
     return cell_index(i, j);
 }
 
+Box Layout::support(int node) const {
+    // The nodes that a cell sees begin with those of its own number along each axis.
+    const Vec2 last = cell.cwiseProduct(Vec2(node % nodes_x() + 1, node / nodes_x() + 1));
+    return {last - (degree + 1) * cell, last};
+}
+
+namespace {
+
+// Kinds of cells along an axis that see different B-splines: those before whose first or beyond whose last knot the grid ends.
+constexpr int kinds_of_cells = 4;
+int kind_of_cell(int i, int cells) { return (i == 0 ? 1 : 0) + (i == cells - 1 ? 2 : 0); }
+CellEnds ends_of_kind(int kind) { return {(kind & 1) != 0, (kind & 2) != 0}; }
+
+} // namespace
+
 Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials) : layout(Layout::of(scene)) {
-    const Vec2 size = layout.point_size();
-    const ShapeFunction kind =
-        scene.solver.shape_function == ShapeFunction::linear ? ShapeFunction::linear : ShapeFunction::gimp;
-    for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
-        const Vec2 place = size.cwiseProduct(Vec2(slot % layout.per_side + 0.5, slot / layout.per_side + 0.5));
-        weights.push_back(cell_weights(kind, place, layout.cell, 0.5 * size));
-    }
+    const ShapeFunction kind = scene.solver.shape_function;
+    find_weights(kind == ShapeFunction::automatic ? ShapeFunction::gimp : kind);
     place_points(scene, materials);
     if (points.count() == 0)
         throw InputError(scene.file.string(), "specimen", scene.title, "no material is left: cutouts or void cover it all");
+    if (!points.part.empty()) check_parts(scene);
     find_facets(scene);
     if (!materials.homogeneous()) mark_changes();
+}
+
+void Discretisation::find_weights(ShapeFunction kind) {
+    const Vec2 size = layout.point_size();
+    for (int cells = 0; cells < (layout.degree == 1 ? 1 : kinds_of_cells * kinds_of_cells); ++cells) {
+        for (int place = 0; place < layout.points_per_cell(); ++place) {
+            const Vec2 x = size.cwiseProduct(Vec2(place % layout.per_side + 0.5, place / layout.per_side + 0.5));
+            weights.push_back(cell_weights(kind, x, layout.cell, 0.5 * size,
+                                           {ends_of_kind(cells % kinds_of_cells), ends_of_kind(cells / kinds_of_cells)}));
+            if (cells == 0) corner_weights.push_back(cell_weights(ShapeFunction::linear, x, layout.cell, 0.5 * size));
+        }
+    }
+}
+
+std::array<double, most_nodes> Discretisation::values_at(int c, const Vec2& x) const {
+    const Vec2 place = x - layout.cell_corner(c);
+    if (layout.degree == 1) {
+        const Vec2 r = place.cwiseQuotient(layout.cell);
+        const Vec2 l = Vec2::Ones() - r;
+        return {l.x() * l.y(), r.x() * l.y(), l.x() * r.y(), r.x() * r.y()};
+    }
+    const std::array<CellEnds, 2> ends{ends_of_kind(kind_of_cell(c % layout.cells_x, layout.cells_x)),
+                                       ends_of_kind(kind_of_cell(c / layout.cells_x, layout.cells_y))};
+    return cell_weights(ShapeFunction::bspline2, place, layout.cell, {}, ends).value;
 }
 
 void Discretisation::mark_changes() {
@@ -140,31 +184,35 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
     const int columns = layout.cells_x * layout.per_side;
     points.lattice.assign(static_cast<std::size_t>(columns) * layout.cells_y * layout.per_side, -1);
     points.first_of_cell.reserve(layout.cells() + 1);
-    const Cutouts cutouts(scene.specimen.cutouts);
+    points.node = PointTable<int>(layout.nodes_per_cell());
+    const Extent extent(scene.specimen);
     for (int c = 0; c < layout.cells(); ++c) {
         points.first_of_cell.push_back(points.count());
         const LocalWood wood = wood_of_cell(materials, c);
         const Eigen::Matrix3d C = wood.elasticity.stiffness();
+        points.stiffness.push_back({C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)});
+        const auto nodes = layout.cell_nodes(c);
+        const int kind = kind_of_cell(c % layout.cells_x, layout.cells_x) + kinds_of_cells * kind_of_cell(c / layout.cells_x, layout.cells_y);
+        const int first_slot = layout.degree == 1 ? 0 : kind * layout.points_per_cell();
         for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
             const int column = c % layout.cells_x * layout.per_side + slot % layout.per_side;
             const int row = c / layout.cells_x * layout.per_side + slot / layout.per_side;
             const Vec2 corner = size.cwiseProduct(Vec2(column, row));
-            const auto [share, x] = cutouts.leave_of({corner, corner + size});
+            const auto [share, x] = extent.leave_of({corner, corner + size});
             if (share < least_share) continue;
             if (materials.at(x).filled == 0.0) continue;
             points.lattice[static_cast<std::size_t>(row) * columns + column] = points.count();
             points.position.push_back(x);
             points.cell.push_back(c);
-            points.slot.push_back(static_cast<std::uint8_t>(slot));
-            points.node.push_back(layout.cell_nodes(c));
-            const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
-            for (int k = 0; k < 6; ++k) points.stiffness[k].push_back(constants[k]);
+            points.slot.push_back(static_cast<std::uint16_t>(first_slot + slot));
+            points.node.add({nodes.data(), static_cast<std::size_t>(layout.nodes_per_cell())});
             if (!materials.homogeneous() && !materials.orthotropic()) points.layers.push_back(wood.elasticity.coefficients.head<4>());
             points.volume.push_back(share * size.prod() * layout.thickness);
             points.mass.push_back(wood.density * points.volume.back());
             if (materials.orthotropic()) points.out_of_plane.push_back(stress_out_of_plane(wood));
             else points.poisson_ratio.push_back(wood.poisson_ratios[0]);
             points.latewood.push_back(static_cast<float>(wood.latewood));
+            if (!scene.specimen.parts.empty()) points.part.push_back(part_at(scene.specimen.parts, x));
         }
     }
     points.first_of_cell.push_back(points.count());
@@ -174,6 +222,20 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         double filled = 0.0;
         for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) filled += points.volume[p];
         cell_is_full_[c] = filled > (1.0 - 1e-9) * whole;
+    }
+}
+
+// Parts that share a node would move together there.
+void Discretisation::check_parts(const Scene& scene) const {
+    std::vector<int> part(layout.nodes(), -1);
+    for (int p = 0; p < points.count(); ++p) {
+        for (const int node : points.node[p]) {
+            int& known = part[node];
+            if (known >= 0 && known != points.part[p])
+                throw InputError(scene.file.string(), "specimen.parts", std::to_string(known) + " and " + std::to_string(points.part[p]),
+                                 "two parts must lie " + std::to_string(layout.degree + 1) + " cells apart at the least, or make up one shape");
+            known = points.part[p];
+        }
     }
 }
 

@@ -7,15 +7,19 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace crampfit {
 
 /// How grid and points lie in the specimen. The grid fits the specimen exactly: the asked spacing is rounded, each way on its
-/// own, so that sides lie on grid lines. Cells and nodes are counted row by row from the lower left corner.
+/// own, so that sides lie on grid lines. Cells and nodes are counted row by row from the lower left corner. Nodes are the cells'
+/// corners, or, for quadratic B-splines, the places where a line's coefficients are its values (Greville): the middles of cells, and
+/// the grid's ends.
 struct Layout {
     int cells_x = 0;
     int cells_y = 0;
+    int degree = 1;    // of the shape functions along an axis; 2: B-splines
     int per_side = 0;  // points along one side of a cell
     Vec2 cell;         // grid spacing in x and y [m]
     double thickness = 0;  // [m]
@@ -23,22 +27,51 @@ struct Layout {
     static Layout of(const Scene& scene);
 
     int cells() const { return cells_x * cells_y; }
-    int nodes() const { return (cells_x + 1) * (cells_y + 1); }
+    int nodes_x() const { return cells_x + degree; }
+    int nodes_y() const { return cells_y + degree; }
+    int nodes() const { return nodes_x() * nodes_y(); }
+    int nodes_per_cell() const { return (degree + 1) * (degree + 1); }
     int points_per_cell() const { return per_side * per_side; }
     Vec2 point_size() const { return cell / per_side; }
     Vec2 size() const { return {cells_x * cell.x(), cells_y * cell.y()}; }
     int cell_index(int i, int j) const { return j * cells_x + i; }
-    int node_index(int i, int j) const { return j * (cells_x + 1) + i; }
+    int node_index(int i, int j) const { return j * nodes_x() + i; }
     Vec2 node_position(int node) const {
-        return {(node % (cells_x + 1)) * cell.x(), (node / (cells_x + 1)) * cell.y()};
+        return {place_of_node(node % nodes_x(), cells_x) * cell.x(), place_of_node(node / nodes_x(), cells_y) * cell.y()};
     }
+    /// Where the shape function of a node is not zero; may reach beyond the specimen.
+    Box support(int node) const;
     Vec2 cell_corner(int c) const { return {(c % cells_x) * cell.x(), (c / cells_x) * cell.y()}; }
-    std::array<int, 4> cell_nodes(int c) const {
+    /// The nodes that a cell sees, row by row: the first `nodes_per_cell()` of these.
+    std::array<int, most_nodes> cell_nodes(int c) const {
+        std::array<int, most_nodes> nodes{};
         const int corner = node_index(c % cells_x, c / cells_x);
-        return {corner, corner + 1, corner + cells_x + 1, corner + cells_x + 2};
+        for (int k = 0; k < nodes_per_cell(); ++k) nodes[k] = corner + k / (degree + 1) * nodes_x() + k % (degree + 1);
+        return nodes;
     }
     /// The cell that holds x; the nearest one for a place outside.
     int cell_at(const Vec2& x) const;
+
+  private:
+    // In cells, of node i along an axis of so many cells.
+    double place_of_node(int i, int cells) const { return degree == 1 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(cells)); }
+};
+
+/// So many values a point, one row each.
+template <class Value>
+class PointTable {
+  public:
+    explicit PointTable(int width = 0) : width_(width) {}
+
+    std::span<Value> operator[](int p) { return {values_.data() + static_cast<std::size_t>(p) * width_, width_}; }
+    std::span<const Value> operator[](int p) const { return {values_.data() + static_cast<std::size_t>(p) * width_, width_}; }
+    bool same(int p, int q) const { return std::ranges::equal((*this)[p], (*this)[q]); }
+    void resize(int points) { values_.resize(static_cast<std::size_t>(points) * width_); }
+    void add(std::span<const Value> row) { values_.insert(values_.end(), row.begin(), row.end()); }
+
+  private:
+    std::size_t width_;
+    std::vector<Value> values_;
 };
 
 /// How the wood differs between neighbouring points: not at all, by the direction of its grain alone, or in its constants.
@@ -49,28 +82,29 @@ enum class Change : std::uint8_t { none, grain, wood };
 struct Points {
     std::vector<Vec2> position;              // middle of what is left of its domain [m]
     std::vector<int> cell;
-    std::vector<std::uint8_t> slot;          // which place in its cell, row by row
-    std::vector<std::array<int, 4>> node;    // the velocity fields it belongs to at its cell's four nodes
-    std::array<std::vector<double>, 6> stiffness;  // stress from strain: xx,xx; xx,yy; yy,yy; xy,xy; xx,xy; yy,xy [Pa]
+    std::vector<std::uint16_t> slot;         // which of the discretisation's `weights` are its own
+    PointTable<int> node;                    // the velocity fields it belongs to at the nodes that its cell sees
+    std::vector<std::array<double, 6>> stiffness;  // [cells] stress from strain: xx,xx; xx,yy; yy,yy; xy,xy; xx,xy; yy,xy [Pa]
     std::vector<Eigen::Vector4d> layers;     // coefficients of LayeredElasticity; empty where all wood is the same or some orthotropic
     std::vector<double> volume;              // [m^3]
     std::vector<double> mass;                // [kg]
     std::vector<double> poisson_ratio;       // for the stress out of the plane; empty where some wood is orthotropic
     std::vector<Eigen::Vector3d> out_of_plane;  // there: stress zz per stress xx, yy, xy in plane strain
     std::vector<float> latewood;             // 0..1, for pictures
+    std::vector<int> part;                   // of the specimen's parts; empty where it has none
     std::vector<Change> changes;             // from a neighbouring point to this one; empty: nowhere
     std::vector<int> first_of_cell;          // [cells + 1]
     std::vector<int> lattice;                // [rows x columns of point places] point there, or -1
 
     int count() const { return static_cast<int>(position.size()); }
     Eigen::Matrix3d stiffness_of(int p) const {
-        const auto& c = stiffness;
+        const auto& c = stiffness[cell[p]];
         Eigen::Matrix3d C;
-        C << c[0][p], c[1][p], c[4][p], c[1][p], c[2][p], c[5][p], c[4][p], c[5][p], c[3][p];
+        C << c[0], c[1], c[4], c[1], c[2], c[5], c[4], c[5], c[3];
         return C;
     }
     double density(int p) const { return mass[p] / volume[p]; }
-    double stiffest(int p) const { return std::max(stiffness[0][p], stiffness[2][p]); }  // of both axes [Pa]
+    double stiffest(int p) const { return std::max(stiffness[cell[p]][0], stiffness[cell[p]][2]); }  // of both axes [Pa]
 };
 
 /// A short piece of the specimen's surface: of its sides, or of a cutout's true outline and not of the staircase of the points.
@@ -80,7 +114,7 @@ struct Facet {
     Vec2 position;                 // its middle, undeformed [m]
     double length;                 // [m]
     Vec2 normal;                   // unit, out of the specimen
-    std::array<double, 4> weight;  // of the point's cell's nodes
+    std::array<double, most_nodes> weight;  // of the nodes that the point's cell sees
 };
 
 /// Points, grid layout and shape functions: what both solvers share. In the undeformed specimen a point stays in its cell for
@@ -92,15 +126,19 @@ class Discretisation {
 
     Layout layout;
     Points points;
-    std::vector<CellWeights> weights;  // [points per cell] by slot
+    std::vector<CellWeights> weights;  // by slot: places in a cell row by row and, for B-splines, for each kind of cell (`cell_ends`)
+    std::vector<CellWeights> corner_weights;  // linear, by place in a cell: of what is given at the cells' corners
     std::vector<Facet> facets;
 
     Box domain(int p) const {  // of a point, whatever cutouts take of it
-        const int slot = points.slot[p];
-        const Vec2 corner = layout.point_size().cwiseProduct(Vec2(slot % layout.per_side, slot / layout.per_side));
+        const int place = place_of(p);
+        const Vec2 corner = layout.point_size().cwiseProduct(Vec2(place % layout.per_side, place / layout.per_side));
         const Vec2 low = layout.cell_corner(points.cell[p]) + corner;
         return {low, low + layout.point_size()};
     }
+    int place_of(int p) const { return points.slot[p] % layout.points_per_cell(); }  // in its cell, row by row
+    /// Shape functions of the nodes that a cell sees at x, which may lie outside the cell: they go on as they do in it.
+    std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     int point_at(const Vec2& x) const;                 // the point whose domain holds x, or -1
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;  // on average
@@ -122,12 +160,14 @@ class Discretisation {
     }
 
   private:
+    void find_weights(ShapeFunction kind);
+    void check_parts(const Scene& scene) const;
     void mark_changes();
     Change change_between(int p, int other) const;
     void place_points(const Scene& scene, const MaterialMap& materials);
     int point_beside(const Vec2& x) const;
     void add_facet(int p, const Vec2& position, double length, const Vec2& normal);
-    void add_void_facets(const std::vector<Shape>& cutouts);
+    void add_void_facets(const SpecimenPlan& specimen);
     void find_facets(const Scene& scene);
 
     std::vector<bool> cell_is_full_;

@@ -79,13 +79,15 @@ class WoodGradient {
     Vec2 normal_ = Vec2::UnitX();  // in which the wood changes most
 };
 
-// The virtual extension at the nodes of one cell, and how far it reaches.
+// The virtual extension at the corners of the grid's cells, and how far it reaches. It is linear between them, whatever the shape
+// functions of the motion.
 class Extension {
   public:
     // It keeps off other wood, or not.
     Extension(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end, const EnergyReleaseOptions& options,
               bool keeps_off)
-        : body_(body), line_(cracks.lines[crack]), at_end_(at_end) {
+        : corners(body.layout), body_(body), line_(cracks.lines[crack]), at_end_(at_end) {
+        corners.degree = 1;
         const double h = body.layout.cell.maxCoeff();
         const double near = (options.outer + options.margin) * h;
         const double clear = keeps_off ? distance_to_other_wood(near) : near;
@@ -100,11 +102,10 @@ class Extension {
     bool meets_other_wood = false;  // the domain cannot keep clear of it
 
     // Unit at the tip, along the crack behind it; nothing on the specimen's outline, which stays where it is.
-    Vec2 at(int node) const {
-        const Layout& layout = body_.layout;
-        const Vec2 x = layout.node_position(node);
+    Vec2 at(int corner) const {
+        const Vec2 x = corners.node_position(corner);
         const double size = size_at(x);
-        if (size == 0.0 || on_outline(node)) return Vec2::Zero();
+        if (size == 0.0 || on_outline(corner)) return Vec2::Zero();
         return size * line_.direction_near(at_end_, x);
     }
 
@@ -112,6 +113,8 @@ class Extension {
         const double distance = (x - line_.tip(at_end_).position).norm();
         return std::clamp((outer - distance) / (outer - inner), 0.0, 1.0);
     }
+
+    Layout corners;                 // as nodes
 
   private:
     // From the tip to the nearest point where the wood changes, as far as `reach` [m].
@@ -140,10 +143,10 @@ class Extension {
         return nearest;
     }
 
-    bool on_outline(int node) const {
-        const Layout& layout = body_.layout;
-        const int i = node % (layout.cells_x + 1);
-        const int j = node / (layout.cells_x + 1);
+    bool on_outline(int corner) const {
+        const Layout& layout = corners;
+        const int i = corner % layout.nodes_x();
+        const int j = corner / layout.nodes_x();
         if (i == 0 || j == 0 || i == layout.cells_x || j == layout.cells_y) return true;
         for (const auto& [di, dj] : {std::pair{-1, -1}, {0, -1}, {-1, 0}, {0, 0}})
             if (!body_.cell_is_full(layout.cell_index(i + di, j + dj))) return true;
@@ -159,17 +162,17 @@ class Extension {
 template <class Visit>
 void for_points_in(const Discretisation& body, const Vec2& tip, const Extension& extension, Visit visit) {
     body.for_cells_near(tip, extension.outer, [&](int c) {
-        const std::array<int, 4> nodes = body.layout.cell_nodes(c);
-        std::array<Vec2, 4> q_node;
-        for (int k = 0; k < 4; ++k) q_node[k] = extension.at(nodes[k]);
-        if (std::all_of(q_node.begin(), q_node.end(), [](const Vec2& q) { return q.isZero(); })) return;
+        const auto corners = extension.corners.cell_nodes(c);
+        std::array<Vec2, 4> q_corner;
+        for (int k = 0; k < 4; ++k) q_corner[k] = extension.at(corners[k]);
+        if (std::all_of(q_corner.begin(), q_corner.end(), [](const Vec2& q) { return q.isZero(); })) return;
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
-            const CellWeights& w = body.weights[body.points.slot[p]];
+            const CellWeights& w = body.corner_weights[body.place_of(p)];
             Vec2 q = Vec2::Zero();
             Mat2 q_gradient = Mat2::Zero();
             for (int k = 0; k < 4; ++k) {
-                q += w.value[k] * q_node[k];
-                q_gradient += q_node[k] * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
+                q += w.value[k] * q_corner[k];
+                q_gradient += q_corner[k] * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
             }
             visit(p, q, q_gradient);
         }

@@ -144,7 +144,7 @@ void Equilibrium::find_forces() {
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
 
-GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {
+GridFactor::Element Equilibrium::element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {
     GridFactor::Element made{{}, stiffness};
     for (int a = 0; a < 8; ++a) made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
     return made;
@@ -166,7 +166,7 @@ void Equilibrium::couple(std::span<const int> rows, std::span<const double> step
 }
 
 // The same of what joins up to four fields.
-void Equilibrium::couple_fields(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+void Equilibrium::couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
     std::array<int, 8> rows;
     std::array<double, 8> steps;
     for (int a = 0; a < 8; ++a) {
@@ -177,7 +177,7 @@ void Equilibrium::couple_fields(const std::array<int, 4>& fields, const Eigen::M
     couple(rows, steps, stiffness);
 }
 
-void Equilibrium::add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
     extra_.emplace(cell, element(fields, stiffness));
     couple_fields(fields, stiffness);
 }
@@ -190,7 +190,7 @@ void Equilibrium::for_groups_of(int c, const Visit& visit) const {
     const int last = points.first_of_cell[c + 1];
     while (p < last) {
         const int first = p;
-        while (p < last && points.node[p] == points.node[first]) ++p;
+        while (p < last && points.node.same(p, first)) ++p;
         visit(points.node[first], first, p - first);
     }
 }
@@ -202,7 +202,7 @@ void Equilibrium::couple_points(bool geometric) {
         return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 || free_of_dof_[2 * f + 1] >= 0;
     };
     for (int c = 0; c < body_.layout.cells(); ++c)
-        for_groups_of(c, [&](const std::array<int, 4>& fields, int first, int count) {
+        for_groups_of(c, [&](std::span<const int> fields, int first, int count) {
             if (std::any_of(fields.begin(), fields.end(), goes))
                 couple_fields(fields, internal_force_.tangent(first, count, displacement_, geometric));
         });
@@ -221,13 +221,13 @@ void Equilibrium::add_pairs() {
             const Vec2 along = left_of(pair.normal);
             const Mat2 symmetric = drag.stiffness * along * along.transpose();
             stiffness += symmetric;
-            add_rubbing({pair.left, pair.right, -1, -1}, {1.0, -1.0, 0.0, 0.0}, -1, drag.tangent - symmetric);
+            add_rubbing(std::array{pair.left, pair.right, -1, -1}, std::array{1.0, -1.0, 0.0, 0.0}, -1, drag.tangent - symmetric);
         }
         if (std::exchange(pair_stiffness_[k], stiffness) != stiffness) factor_.mark(cell);
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
-        add_extra(cell, {pair.left, pair.right, -1, -1}, both);
+        add_extra(cell, std::array{pair.left, pair.right, -1, -1}, both);
     }
 }
 
@@ -246,7 +246,7 @@ void Equilibrium::add_touches(bool geometric) {
         const int driver = sliding_driver_[i];
         for (const SlidingBody::Touch& touch : sliding_[i].touches(place_of(driver), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
-            const std::array<int, 4>& fields = body_.points.node[facet.point];
+            const auto fields = std::as_const(body_.points).node[facet.point];
             const Mat2 normal = touch.normal * touch.normal.transpose();
             const Mat2 along = Mat2::Identity() - normal;
             const double turning = geometric ? touch.force * touch.curvature : 0.0;
@@ -292,7 +292,7 @@ bool Equilibrium::factor_tangent(bool geometric) {
     couple_points(geometric);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
-        for_groups_of(cell, [&](const std::array<int, 4>& fields, int first_point, int count) {
+        for_groups_of(cell, [&](std::span<const int> fields, int first_point, int count) {
             elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
         });
         const auto [first, last] = extra_.equal_range(cell);
@@ -451,11 +451,11 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
 }
 
 // Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
-void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
+void Equilibrium::mark_changes(const PointTable<int>& before) {
     int last = -1;
     for (int p = 0; p < body_.points.count(); ++p) {
         const int c = body_.points.cell[p];
-        if (c == last || before[p] == body_.points.node[p]) continue;
+        if (c == last || std::ranges::equal(before[p], std::as_const(body_.points).node[p])) continue;
         last = c;
         const Vec2 corner = body_.layout.cell_corner(c);
         const Vec2& cell = body_.layout.cell;
@@ -467,7 +467,7 @@ Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
-    const std::vector<std::array<int, 4>> before = std::exchange(body_.points.node, snapshot.node);
+    const PointTable<int> before = std::exchange(body_.points.node, snapshot.node);
     boundary_.held = snapshot.held;
     pieces_ = snapshot.pieces;
     displacement_ = snapshot.displacement;

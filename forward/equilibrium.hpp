@@ -95,7 +95,7 @@ class Equilibrium {
     /// Everything that growth and solution change, to come back to.
     struct Snapshot {
         CrackFields cracks;
-        std::vector<std::array<int, 4>> node;
+        PointTable<int> node;
         std::vector<Boundary::Held> held;
         LoosePieces pieces;
         std::vector<Vec2> displacement;
@@ -109,20 +109,20 @@ class Equilibrium {
   private:
     TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
     void renumber();
-    void mark_changes(const std::vector<std::array<int, 4>>& fields_before);
+    void mark_changes(const PointTable<int>& fields_before);
     void find_forces();
     bool factor_tangent(bool geometric);
-    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
-    void couple_fields(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
+    void couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void couple_points(bool geometric);
-    void add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    void add_extra(int cell, std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     template <class Visit>
     void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
     void add_pairs();
     void add_touches(bool geometric);
     void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
-    void add_rubbing(const std::array<int, 4>& fields, const std::array<double, 4>& weight, int driver, const Mat2& remainder);
+    void add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder);
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
     Mat2 pair_stiffness(const FieldPair& pair) const;

@@ -133,9 +133,11 @@ Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
                                 [&](const Eigen::VectorXd& x) { return remainder_of(x); });
 }
 
-void Equilibrium::add_rubbing(const std::array<int, 4>& fields, const std::array<double, 4>& weight, int driver, const Mat2& remainder) {
+void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder) {
     if (remainder.isZero(0.0)) return;
-    rubbing_.push_back({fields, weight, driver, remainder});
+    Rubbing& rubbing = rubbing_.emplace_back(Rubbing{{}, {}, driver, remainder});
+    std::copy_n(fields.begin(), 4, rubbing.fields.begin());
+    std::copy_n(weight.begin(), 4, rubbing.weight.begin());
     // What is prescribed loads the others here too.
     Vec2 apart = driver < 0 ? Vec2::Zero() : Vec2(-still_to_go_[driver]);
     for (int a = 0; a < 4; ++a)

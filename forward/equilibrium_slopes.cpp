@@ -137,7 +137,8 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
         for (const SlidingBody::Touch& touch : sliding_[s].touches(place_of(sliding_driver_[s]), displacement_)) {
             const Facet& facet = body_.facets[touch.facet];
-            const int stiffest = points.stiffness[0][facet.point] >= points.stiffness[2][facet.point] ? 0 : 1;
+            const auto& constants = points.stiffness[points.cell[facet.point]];
+            const int stiffest = constants[0] >= constants[2] ? 0 : 1;
             for (std::size_t n = 0; n < numbers.size(); ++n) {
                 const double stiffer = numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
                 const Vec2 push = stiffer * touch.force * touch.normal;

@@ -18,9 +18,9 @@ constexpr double least_freed = 0.15;
 
 } // namespace
 
-ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
+ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates) {
+      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates), team_(threads), mapping_(scene.solver, body) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());
     velocity_.assign(fields, Vec2::Zero());
@@ -34,26 +34,42 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
         velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
         books_.work += 0.5 * mass_[h.field] * velocity_[h.field][h.axis] * velocity_[h.field][h.axis];
     }
+    list_held();
+    start_parts();
+    carried_ = velocity_;
     place_bodies();
 }
 
+// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its forces
+// are found, and by the rest after them.
+double ExplicitSolver::lag() const {
+    switch (scene_.solver.stress_update) {
+        case StressUpdate::first: return -0.5;
+        case StressUpdate::average: return 0.0;
+        case StressUpdate::last: break;
+    }
+    return 0.5;
+}
+
 void ExplicitSolver::step() {
-    std::fill(force_.begin(), force_.end(), Vec2::Zero());
+    advance_displacements(0.5 - lag());
+    team_.pieces(cracks_.fields(), [&](int first, int last) { std::fill(force_.begin() + first, force_.begin() + last, Vec2::Zero()); });
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
-    internal_force_.add(displacement_, force_);
+    internal_force_.add(displacement_, force_, team_);
     surface_forces();
     tie_forces();
     advance_velocities();
-    close_crack_faces();
+    close_crack_faces(true);
     prescribe_velocities();
-    advance_displacements();
+    carry_velocities();
+    advance_displacements(0.5 + lag());
     time_ += plan_.time_step;
 }
 
 void ExplicitSolver::surface_forces() {
     for (const Boundary::Traction& t : boundary_.tractions) {
         Vec2 velocity = Vec2::Zero();
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) {
             const int field = body_.points.node[t.facet.point][k];
             force_[field] += t.facet.weight[k] * t.force;
             velocity += t.facet.weight[k] * velocity_[field];
@@ -63,10 +79,12 @@ void ExplicitSolver::surface_forces() {
     }
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        reaction_[driver] = sliding_[i].push(moved(driver), displacement_, force_);
-        sliding_[i].settle(moved(driver), displacement_);
-        books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver));
+        const Vec2 gone = boundary_.moved(driver, time_ + (0.5 - lag()) * plan_.time_step, displacement_);
+        reaction_[driver] = sliding_[i].push(gone, displacement_, force_);
+        sliding_[i].settle(gone, displacement_);
+        books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver, time_, time_ + plan_.time_step));
     }
+    if (part_contact_) part_contact_->push(displacement_, force_);
 }
 
 double ExplicitSolver::tie_stiffness(const FieldPair& pair) const {
@@ -87,16 +105,30 @@ void ExplicitSolver::tie_forces() {
 void ExplicitSolver::advance_velocities() {
     const double dt = plan_.time_step;
     const double drag = 0.5 * dt * scene_.solver.damping;
-    for (std::size_t n = 0; n < mass_.size(); ++n) {
-        if (mass_[n] == 0.0) continue;
-        const Vec2 before = velocity_[n];
-        velocity_[n] = ((1.0 - drag) * before + dt / mass_[n] * force_[n]) / (1.0 + drag);
-        acceleration_[n] = (velocity_[n] - before) / dt;
-        if (drag > 0.0) books_.damped += mass_[n] * drag * 0.5 * (before + velocity_[n]).squaredNorm();
-    }
+    damped_.assign(mass_.size() / Team::piece + 1, 0.0);
+    team_.pieces(cracks_.fields(), [&](int first, int last) {
+        double damped = 0.0;
+        for (int n = first; n < last; ++n) {
+            if (mass_[n] == 0.0) continue;
+            const Vec2 before = velocity_[n];
+            velocity_[n] = ((1.0 - drag) * before + dt / mass_[n] * force_[n]) / (1.0 + drag);
+            acceleration_[n] = (velocity_[n] - before) / dt;
+            if (drag > 0.0) damped += mass_[n] * drag * 0.5 * (before + velocity_[n]).squaredNorm();
+        }
+        damped_[first / Team::piece] = damped;
+    });
+    for (const double damped : damped_) books_.damped += damped;
+    if (mapping_.nodes_carry()) books_.damped += mapping_.extrapolate(velocity_, acceleration_, dt, {mass_, held_axes_, team_});
 }
 
-void ExplicitSolver::close_crack_faces() {
+void ExplicitSolver::carry_velocities() {
+    if (!mapping_.is_used() || mapping_.nodes_carry()) return;
+    books_.damped += mapping_.carry(carried_, velocity_, acceleration_, plan_.time_step, {mass_, held_axes_, team_});
+    close_crack_faces(false);
+}
+
+// Without force: velocities that the points hand back may close faces again, though the points themselves do not.
+void ExplicitSolver::close_crack_faces(bool with_force) {
     const double dt = plan_.time_step;
     face_force_.assign(cracks_.pairs.size(), Vec2::Zero());
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
@@ -124,6 +156,7 @@ void ExplicitSolver::close_crack_faces() {
         face_force_[k] = m_left * m_right / total / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;
+        if (!with_force) continue;
         acceleration_[pair.left] += m_right / total * change / dt;
         acceleration_[pair.right] -= m_left / total * change / dt;
     }
@@ -134,19 +167,23 @@ void ExplicitSolver::prescribe_velocities() {
     const double drag = 0.5 * dt * scene_.solver.damping;
     for (const Boundary::Held& held : boundary_.held) {
         double& v = velocity_[held.field][held.axis];
-        const double wanted = mean_velocity_of(held.driver)[held.axis];
+        const double wanted = velocity_at_end_of_step(held.driver)[held.axis];
         const double before = v - dt * acceleration_[held.field][held.axis];
         const double force = (1.0 + drag) * mass_[held.field] * (wanted - v) / dt;
         books_.work += force * dt * 0.5 * (before + wanted);
+        // What damping takes is counted for the motion that comes about.
+        books_.damped += mass_[held.field] * drag * 0.5 * ((before + wanted) * (before + wanted) - (before + v) * (before + v));
         reaction_[held.driver][held.axis] += force;
         acceleration_[held.field][held.axis] += (wanted - v) / dt;
         v = wanted;
     }
 }
 
-void ExplicitSolver::advance_displacements() {
-    const double dt = plan_.time_step;
-    for (std::size_t n = 0; n < mass_.size(); ++n) displacement_[n] += dt * velocity_[n];
+void ExplicitSolver::advance_displacements(double share) {
+    if (share == 0.0) return;
+    team_.pieces(cracks_.fields(), [&](int first, int last) {
+        for (int n = first; n < last; ++n) displacement_[n] += share * plan_.time_step * velocity_[n];
+    });
 }
 
 TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
@@ -156,16 +193,38 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
 }
 
 EnergyBooks ExplicitSolver::energies() const {
+    // As of the last forces: half of the product of velocities before and after them with the strain energy is what a leapfrog
+    // keeps (Hairer, Lubich and Wanner 2003), exactly so where forces are linear.
     EnergyBooks books = books_;
-    books.strain = internal_force_.energy(displacement_);
+    const double since = time_ > 0.0 ? (0.5 + lag()) * plan_.time_step : 0.0;
+    std::vector<Vec2> there = displacement_;
+    for (std::size_t n = 0; n < there.size(); ++n) there[n] -= since * velocity_[n];
+    books.strain = internal_force_.energy(there);
     for (const FieldPair& pair : cracks_.pairs)
         if (pair.tie > 0.0 && mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0)
-            books.strain += 0.5 * tie_stiffness(pair) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
-    for (std::size_t n = 0; n < mass_.size(); ++n)
-        books.kinetic += 0.5 * mass_[n] * (velocity_[n] + 0.5 * plan_.time_step * acceleration_[n]).squaredNorm();
+            books.strain += 0.5 * tie_stiffness(pair) * (there[pair.left] - there[pair.right]).squaredNorm();
+    books.kinetic = kinetic_energy();
     for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
     for (const SlidingBody& body : sliding_) books.damped += body.dissipated();
+    if (part_contact_) books.contact += part_contact_->stored_energy();
     return books;
+}
+
+double ExplicitSolver::kinetic_energy() const {
+    const double dt = plan_.time_step;
+    if (!mapping_.is_used()) {
+        double sum = 0.0;
+        for (std::size_t n = 0; n < mass_.size(); ++n) sum += 0.5 * mass_[n] * velocity_[n].dot(velocity_[n] - dt * acceleration_[n]);
+        return sum;
+    }
+    // v (v - a dt) = (v - a dt / 2)^2 - (a dt / 2)^2
+    std::vector<Vec2> middle = mapping_.nodes_carry() ? velocity_ : carried_;
+    double half = 0.0;
+    for (std::size_t n = 0; n < middle.size(); ++n) {
+        middle[n] -= 0.5 * dt * acceleration_[n];
+        half += 0.5 * mass_[n] * (0.5 * dt * acceleration_[n]).squaredNorm();
+    }
+    return mapping_.kinetic_energy(middle, team_) - half;
 }
 
 bool ExplicitSolver::is_finite() const {

@@ -4,8 +4,12 @@
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
 #include "forward/internal_force.hpp"
+#include "forward/part_contact.hpp"
 #include "forward/plan.hpp"
+#include "forward/velocity_mapping.hpp"
 
+#include <functional>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -22,10 +26,16 @@ struct EnergyBooks {
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
 /// displacements), lumped mass. As no point ever leaves its cell, mapping velocities to the points and back by the full mass
-/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps them.
+/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps them,
+/// unless the scene asks for another way (VelocityMapping). Displacements may follow velocities at the beginning of a step, at its
+/// end or half and half (`stress_update`): stresses come from displacements.
 class ExplicitSolver {
   public:
-    ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
+    /// `threads` share each step; the result does not depend on how many there are.
+    ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
+
+    /// Starts from these displacements [m] and velocities [m/s] of the nodes, by place in the undeformed specimen, in place of rest.
+    void start(const std::function<Vec2(const Vec2&)>& displacement, const std::function<Vec2(const Vec2&)>& velocity);
 
     /// One time step.
     void step();
@@ -38,7 +48,7 @@ class ExplicitSolver {
     double time() const { return time_; }
     const CrackFields& cracks() const { return cracks_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
-    const std::vector<Vec2>& velocities() const { return velocity_; }  // half a step before
+    const std::vector<Vec2>& velocities() const { return velocity_; }
     const std::vector<TipLoad>& tip_loads() const { return tip_loads_; }  // latest, two a crack: start, end
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
@@ -50,15 +60,21 @@ class ExplicitSolver {
 
   private:
     void place_bodies();
+    void start_parts();
+    void list_held();
+    double lag() const;
+    double kinetic_energy() const;
     void adopt(const std::vector<CrackFields::NewField>& fields);
-    Vec2 mean_velocity_of(int driver) const;
+    Vec2 mean_velocity_of(int driver, double from, double to) const;
+    Vec2 velocity_at_end_of_step(int driver) const;
 
     void surface_forces();
     void tie_forces();
     void advance_velocities();
-    void close_crack_faces();
+    void carry_velocities();
+    void close_crack_faces(bool with_force);
     void prescribe_velocities();
-    void advance_displacements();
+    void advance_displacements(double share);
     double tie_stiffness(const FieldPair& pair) const;
 
     const Scene& scene_;
@@ -68,13 +84,18 @@ class ExplicitSolver {
     CrackFields cracks_;
     Boundary boundary_;
     InternalForce internal_force_;
+    mutable Team team_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
+    std::optional<PartContact> part_contact_;
+    mutable VelocityMapping mapping_;
 
     // One entry a field.
     std::vector<double> mass_;        // [kg]
     std::vector<Vec2> displacement_;  // [m]
     std::vector<Vec2> velocity_;      // [m/s]
+    std::vector<Vec2> carried_;       // w of VelocityMapping where the nodes do not keep their velocities [m/s]
+    std::vector<std::uint8_t> held_axes_;  // a bit an axis where the component is prescribed
     std::vector<Vec2> acceleration_;  // [m/s^2]
     std::vector<Vec2> force_;         // [N]
 
@@ -82,6 +103,7 @@ class ExplicitSolver {
     std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
     std::vector<TipLoad> tip_loads_;
     std::vector<double> last_growth_; // [two a crack] [s]
+    std::vector<double> damped_;      // [pieces of the fields] in this step [J]
     double time_ = 0.0;
     EnergyBooks books_;
 };

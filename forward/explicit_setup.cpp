@@ -26,20 +26,70 @@ void ExplicitSolver::place_bodies() {
     }
 }
 
-// Over the step that begins now: in the step in which it stops a driver goes just as far as it should.
-Vec2 ExplicitSolver::mean_velocity_of(int driver) const {
-    return boundary_.velocity_of(driver) *
-           std::clamp((boundary_.travel_time(driver) - time_) / plan_.time_step, 0.0, 1.0);
+// On the way from here to there in time: in the step in which it stops a driver goes just as far as it should.
+Vec2 ExplicitSolver::mean_velocity_of(int driver, double from, double to) const {
+    return boundary_.velocity_of(driver) * std::clamp((boundary_.travel_time(driver) - from) / (to - from), 0.0, 1.0);
+}
+
+// Which nodes move with from then on, until the forces of the next step.
+Vec2 ExplicitSolver::velocity_at_end_of_step(int driver) const {
+    const double dt = plan_.time_step;
+    return mean_velocity_of(driver, time_ + (lag() < 0.0 ? dt : 0.0), time_ + (lag() > 0.0 ? dt : 2.0 * dt));
+}
+
+void ExplicitSolver::list_held() {
+    held_axes_.assign(cracks_.fields(), 0);
+    for (const Boundary::Held& h : boundary_.held) held_axes_[h.field] = static_cast<std::uint8_t>(held_axes_[h.field] | 1 << h.axis);
+}
+
+// Of a part that moves at the start; edges and bodies hold on to what they hold.
+void ExplicitSolver::start_parts() {
+    const auto& parts = scene_.specimen.parts;
+    if (parts.size() > 1) part_contact_.emplace(body_, mass_, plan_.added_frequency_squared);
+    for (int p = 0; p < body_.points.count() && !parts.empty(); ++p)
+        for (const int field : body_.points.node[p])
+            for (int axis = 0; axis < 2; ++axis)
+                if (!(held_axes_[field] >> axis & 1)) velocity_[field][axis] = parts[body_.points.part[p]].velocity[axis];
+    for (std::size_t n = 0; n < mass_.size(); ++n)
+        for (int axis = 0; axis < 2; ++axis)
+            if (!(held_axes_[n] >> axis & 1)) books_.work += 0.5 * mass_[n] * velocity_[n][axis] * velocity_[n][axis];
+}
+
+void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement, const std::function<Vec2(const Vec2&)>& velocity) {
+    for (int f = 0; f < cracks_.fields(); ++f) {
+        const Vec2 x = body_.layout.node_position(cracks_.node_of_field[f]);
+        displacement_[f] = displacement(x);
+        velocity_[f] = velocity(x);
+    }
+    for (const Boundary::Held& h : boundary_.held) velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
+    std::fill(force_.begin(), force_.end(), Vec2::Zero());
+    internal_force_.add(displacement_, force_, team_);
+    carried_ = velocity_;
+    for (std::size_t n = 0; n < mass_.size(); ++n) {
+        if (mass_[n] == 0.0) continue;
+        acceleration_[n] = force_[n] / mass_[n];
+        for (int axis = 0; axis < 2; ++axis)
+            if (held_axes_[n] >> axis & 1) acceleration_[n][axis] = 0.0;
+        carried_[n] -= lag() * plan_.time_step * acceleration_[n];
+    }
+    std::fill(acceleration_.begin(), acceleration_.end(), Vec2::Zero());
+    velocity_ = carried_;
+    if (mapping_.is_used() && !mapping_.nodes_carry()) mapping_.hand_back(velocity_, {mass_, held_axes_, team_});
+    books_ = {};
+    const EnergyBooks at_start = energies();
+    books_.work = at_start.strain + at_start.kinetic;
 }
 
 void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
     for (const auto& [added, from] : fields) {
         displacement_.push_back(displacement_[from]);
         velocity_.push_back(velocity_[from]);
+        carried_.push_back(carried_[from]);
         acceleration_.push_back(acceleration_[from]);
         force_.push_back(Vec2::Zero());
     }
     boundary_.hold_further_fields(cracks_);
+    list_held();
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
 }

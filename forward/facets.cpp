@@ -23,7 +23,7 @@ struct Curve {
     Circle circle;
     bool straight;
     double length;   // [m]
-    double inward;   // 1: the specimen lies left of the straight way, -1: right
+    double inward;   // 1: the specimen lies left of the straight way, or around the circle; -1: right, or in it
 
     Vec2 position(double s) const {
         if (straight) return from + s / length * (to - from);
@@ -32,7 +32,7 @@ struct Curve {
     }
     Vec2 normal(double s) const {  // unit, out of the specimen
         if (straight) return -inward * left_of((to - from) / length);
-        return (circle.centre - position(s)) / circle.radius;
+        return inward * (circle.centre - position(s)) / circle.radius;
     }
 };
 
@@ -50,10 +50,10 @@ std::vector<Curve> sides_of(const std::vector<Vec2>& points, bool specimen_is_in
     return curves;
 }
 
-std::vector<Curve> outline_of(const Shape& cutout) {
-    if (const auto* circle = std::get_if<Circle>(&cutout))
-        return {{Vec2::Zero(), Vec2::Zero(), *circle, false, 2.0 * std::numbers::pi * circle->radius, 1.0}};
-    return sides_of(std::get<Polygon>(cutout).points, false);
+std::vector<Curve> outline_of(const Shape& shape, bool specimen_is_inside) {
+    if (const auto* circle = std::get_if<Circle>(&shape))
+        return {{Vec2::Zero(), Vec2::Zero(), *circle, false, 2.0 * std::numbers::pi * circle->radius, specimen_is_inside ? -1.0 : 1.0}};
+    return sides_of(std::get<Polygon>(shape).points, specimen_is_inside);
 }
 
 struct Stretch {
@@ -104,9 +104,7 @@ int Discretisation::point_beside(const Vec2& x) const {
 
 void Discretisation::add_facet(int p, const Vec2& position, double length, const Vec2& normal) {
     // Next to a cell that has no point it goes on as the cell of its point does.
-    const Vec2 r = (position - layout.cell_corner(points.cell[p])).cwiseQuotient(layout.cell);
-    const Vec2 l = Vec2::Ones() - r;
-    facets.push_back({p, position, length, normal, {l.x() * l.y(), r.x() * l.y(), l.x() * r.y(), r.x() * r.y()}});
+    facets.push_back({p, position, length, normal, values_at(points.cell[p], position)});
 }
 
 void Discretisation::find_facets(const Scene& scene) {
@@ -119,12 +117,14 @@ void Discretisation::find_facets(const Scene& scene) {
         const auto end = cutouts.begin() + static_cast<std::ptrdiff_t>(count);
         return std::any_of(cutouts.begin(), end, [&](const Shape& s) { return inside(s, x); });
     };
-    // Where the outlines of two cutouts fall together, the earlier one has the facets.
-    const auto add_curve = [&](const Curve& curve, std::size_t earlier) {
+    // Where the outlines of two cutouts fall together, the earlier one has the facets; where a part's falls on the rectangle's side or
+    // on a cutout, that has them.
+    const auto add_curve = [&](const Curve& curve, std::size_t earlier, bool of_part) {
         const auto is_surface = [&](double s) {
             const Vec2 in = curve.position(s) - beside * curve.normal(s);
             const Vec2 out = curve.position(s) + beside * curve.normal(s);
-            return rectangle.contains(in) && !cut_by_first(cutouts.size(), in) && !cut_by_first(earlier, out);
+            if (of_part && (!rectangle.contains(out) || has_wood(scene.specimen, out))) return false;
+            return rectangle.contains(in) && has_wood(scene.specimen, in) && !cut_by_first(earlier, out);
         };
         for (const auto& [begin, end] : stretches(curve.length, step, is_surface)) {
             const int count = std::max(1, static_cast<int>(std::ceil((end - begin) / step - just_beside)));
@@ -135,14 +135,16 @@ void Discretisation::find_facets(const Scene& scene) {
             }
         }
     };
-    for (const Curve& side : sides_of({Vec2::Zero(), Vec2(size.x(), 0.0), size, Vec2(0.0, size.y())}, true)) add_curve(side, 0);
+    for (const Curve& side : sides_of({Vec2::Zero(), Vec2(size.x(), 0.0), size, Vec2(0.0, size.y())}, true)) add_curve(side, 0, false);
     for (std::size_t k = 0; k < cutouts.size(); ++k)
-        for (const Curve& curve : outline_of(cutouts[k])) add_curve(curve, k);
-    add_void_facets(cutouts);
+        for (const Curve& curve : outline_of(cutouts[k], false)) add_curve(curve, k, false);
+    for (const Part& part : scene.specimen.parts)
+        for (const Curve& curve : outline_of(part.shape, true)) add_curve(curve, cutouts.size(), true);
+    add_void_facets(scene.specimen);
 }
 
 // The voids of a picture have no smooth outline: there the points' own faces are the surface.
-void Discretisation::add_void_facets(const std::vector<Shape>& cutouts) {
+void Discretisation::add_void_facets(const SpecimenPlan& specimen) {
     const Box rectangle{Vec2::Zero(), layout.size()};
     const Vec2 size = layout.point_size();
     for (int p = 0; p < points.count(); ++p) {
@@ -151,7 +153,7 @@ void Discretisation::add_void_facets(const std::vector<Shape>& cutouts) {
             const Vec2 centre = domain(p).low + 0.5 * size;
             const Vec2 next = centre + size.cwiseProduct(normal);
             if (neighbour(p, step_x, step_y) >= 0 || !rectangle.contains(next)) continue;
-            if (std::any_of(cutouts.begin(), cutouts.end(), [&](const Shape& s) { return inside(s, next); })) continue;
+            if (!has_wood(specimen, next)) continue;
             add_facet(p, 0.5 * (centre + next), step_x != 0 ? size.y() : size.x(), normal);
         }
     }

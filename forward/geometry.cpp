@@ -47,6 +47,12 @@ bool inside(const Shape& shape, const Vec2& x) {
     return inside_polygon(points, x);
 }
 
+bool has_wood(const SpecimenPlan& specimen, const Vec2& x) {
+    const auto in = [&](const Part& part) { return inside(part.shape, x); };
+    if (!specimen.parts.empty() && std::none_of(specimen.parts.begin(), specimen.parts.end(), in)) return false;
+    return std::none_of(specimen.cutouts.begin(), specimen.cutouts.end(), [&](const Shape& cutout) { return inside(cutout, x); });
+}
+
 Box bounds(const Shape& shape) {
     if (const auto* circle = std::get_if<Circle>(&shape))
         return {circle->centre.array() - circle->radius, circle->centre.array() + circle->radius};

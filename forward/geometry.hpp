@@ -26,6 +26,9 @@ bool inside(const Shape& shape, const Vec2& x);
 
 Box bounds(const Shape& shape);
 
+/// True where neither cutouts nor what lies between parts take the specimen's rectangle.
+bool has_wood(const SpecimenPlan& specimen, const Vec2& x);
+
 struct OutlinePoint {
     Vec2 position;    // [m]
     Vec2 normal;      // unit, out of the shape

@@ -6,26 +6,37 @@
 
 namespace crampfit {
 
-InternalForce::InternalForce(const Discretisation& body, bool rotates) : body_(body), rotates_(rotates) { sort_cells(); }
+InternalForce::InternalForce(const Discretisation& body, bool rotates) : body_(body), rotates_(rotates), strips_(body.layout) {
+    sort_cells();
+}
 
 void InternalForce::sort_cells() {
+    const Layout& layout = body_.layout;
     const Points& points = body_.points;
     whole_cells_.clear();
     loose_points_.clear();
     alone_.clear();
-    for (int c = 0; c < body_.layout.cells(); ++c) {
+    first_of_strip_.clear();
+    for (int c = 0; c < layout.cells(); ++c) {
+        if (c == strips_.first_cell(static_cast<int>(first_of_strip_.size())))
+            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
         const int first = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
-        const auto same = [&](const std::array<int, 4>& node) { return node == points.node[first]; };
-        if (body_.cell_is_full(c) && std::all_of(points.node.begin() + first, points.node.begin() + last, same))
+        const auto alike = [&](int p) {
+            int count = 0;
+            for (int q = first; q < last; ++q) count += points.node.same(p, q);
+            return count;
+        };
+        if (body_.cell_is_full(c) && alike(first) == last - first) {
             whole_cells_.push_back(c);
-        else
+        } else {
             for (int p = first; p < last; ++p) {
                 loose_points_.push_back(p);
-                if (std::count(points.node.begin() + first, points.node.begin() + last, points.node[p]) == 1)
-                    alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
+                if (layout.degree == 1 && alike(p) == 1) alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
             }
+        }
     }
+    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
 }
 
 double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
@@ -44,31 +55,37 @@ Vec2 InternalForce::crosswise(int point, const std::vector<Vec2>& displacement) 
     return sum;
 }
 
-template <int PointsPerCell, bool Rotates>
-double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+template <int Nodes, int PointsPerCell, bool Rotates>
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
     const Points& points = body_.points;
-    std::array<Lane, 4> slope_x, slope_y;
-    for (int k = 0; k < 4; ++k) {
-        for (int slot = 0; slot < PointsPerCell; ++slot) {
-            slope_x[k][slot] = body_.weights[slot].slope_x[k];
-            slope_y[k][slot] = body_.weights[slot].slope_y[k];
-        }
-    }
+    std::array<Lane, Nodes> slope_x, slope_y;
+    slope_x.fill(Lane::Zero());
+    slope_y.fill(Lane::Zero());
+    const double volume = body_.layout.cell.prod() * body_.layout.thickness / PointsPerCell;
+    int known = -1;  // the first of the slots whose slopes these are
     double energy = 0.0;
-    for (const int c : whole_cells_) {
+    for (const int c : cells) {
         const int first = points.first_of_cell[c];
-        const std::array<int, 4>& node = points.node[first];
+        if (const int slot = points.slot[first]; slot != known) {
+            known = slot;
+            for (int k = 0; k < Nodes; ++k) {
+                for (int place = 0; place < PointsPerCell; ++place) {
+                    slope_x[k][place] = body_.weights[slot + place].slope_x[k];
+                    slope_y[k][place] = body_.weights[slot + place].slope_y[k];
+                }
+            }
+        }
+        const auto node = points.node[first];
         Lane xx = Lane::Zero(), xy = Lane::Zero(), yx = Lane::Zero(), yy = Lane::Zero();  // du_i / dX_j
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < Nodes; ++k) {
             const Vec2 u = displacement[node[k]];
             xx += u.x() * slope_x[k];
             xy += u.x() * slope_y[k];
             yx += u.y() * slope_x[k];
             yy += u.y() * slope_y[k];
         }
-        const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
-        const auto C = [&](int k) { return Eigen::Map<const Lane>(&points.stiffness[k][first]); };
+        const std::array<double, 6>& C = points.stiffness[c];
         Lane cosine, sine, scale, strain_xx, strain_yy, shear;
         if constexpr (Rotates) {  // elastic_state, written out for many points at once
             const Lane c_part = 2.0 + xx + yy;
@@ -84,9 +101,9 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
             strain_yy = yy;
             shear = xy + yx;
         }
-        const Lane local_xx = volume * (C(0) * strain_xx + C(1) * strain_yy + C(4) * shear);
-        const Lane local_yy = volume * (C(1) * strain_xx + C(2) * strain_yy + C(5) * shear);
-        const Lane local_xy = volume * (C(4) * strain_xx + C(5) * strain_yy + C(3) * shear);
+        const Lane local_xx = volume * (C[0] * strain_xx + C[1] * strain_yy + C[4] * shear);
+        const Lane local_yy = volume * (C[1] * strain_xx + C[2] * strain_yy + C[5] * shear);
+        const Lane local_xy = volume * (C[4] * strain_xx + C[5] * strain_yy + C[3] * shear);
         if (!force) {
             energy += 0.5 * (local_xx * strain_xx + local_yy * strain_yy + local_xy * shear).sum();
             continue;
@@ -101,7 +118,7 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
             P_yx = sine * local_xx + cosine * lower;
             P_yy = sine * upper + cosine * local_yy;
         }
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < Nodes; ++k) {
             (*force)[node[k]].x() -= (P_xx * slope_x[k] + P_xy * slope_y[k]).sum();
             (*force)[node[k]].y() -= (P_yx * slope_x[k] + P_yy * slope_y[k]).sum();
         }
@@ -109,16 +126,22 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
     return energy;
 }
 
-double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
-    const auto visit = [&]<int N>() {
-        return rotates_ ? visit_whole_cells<N, true>(displacement, force) : visit_whole_cells<N, false>(displacement, force);
+template <int PointsPerCell>
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+    const auto visit = [&]<int Nodes>() {
+        return rotates_ ? visit_whole_cells<Nodes, PointsPerCell, true>(cells, displacement, force)
+                        : visit_whole_cells<Nodes, PointsPerCell, false>(cells, displacement, force);
     };
+    return body_.layout.degree == 1 ? visit.template operator()<4>() : visit.template operator()<9>();
+}
+
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     switch (body_.layout.per_side) {
-        case 1: return visit.template operator()<1>();
-        case 2: return visit.template operator()<4>();
-        case 3: return visit.template operator()<9>();
-        case 4: return visit.template operator()<16>();
-        default: return visit.template operator()<25>();
+        case 1: return visit_whole_cells<1>(cells, displacement, force);
+        case 2: return visit_whole_cells<4>(cells, displacement, force);
+        case 3: return visit_whole_cells<9>(cells, displacement, force);
+        case 4: return visit_whole_cells<16>(cells, displacement, force);
+        default: return visit_whole_cells<25>(cells, displacement, force);
     }
 }
 
@@ -126,7 +149,7 @@ template <int Count>
 Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const {
     using Lane = Eigen::Array<double, Count, 1>;
     const Points& points = body_.points;
-    const std::array<int, 4>& node = points.node[first];
+    const auto node = points.node[first];
     std::array<Lane, 4> slope_x, slope_y;
     std::array<Lane, 4> gradient;
     gradient.fill(Lane::Zero());
@@ -145,7 +168,7 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     }
     const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
     std::array<Lane, 6> C;
-    for (int k = 0; k < 6; ++k) C[k] = volume * Eigen::Map<const Lane>(&points.stiffness[k][first]);
+    for (int k = 0; k < 6; ++k) C[k] = volume * points.stiffness[points.cell[first]][k];
     const std::array<std::array<Lane, 4>, 4> A = elastic_tangent(gradient, C, rotates_, geometric);
     Eigen::Matrix<double, 8, 8> sum;
     for (int b = 0; b < 4; ++b) {
@@ -174,28 +197,43 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const s
     }
 }
 
-void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
-    visit_whole_cells(displacement, &force);
+double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     const Points& points = body_.points;
-    for (const int p : loose_points_) {
+    const Place& from = first_of_strip_[strip];
+    const Place& to = first_of_strip_[strip + 1];
+    const std::span<const int> cells(whole_cells_.data() + from.whole_cell, to.whole_cell - from.whole_cell);
+    double energy = visit_whole_cells(cells, displacement, force);
+    for (std::size_t i = from.loose_point; i < to.loose_point; ++i) {
+        const int p = loose_points_[i];
         const PointState state = elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
+        energy += points.volume[p] * state.energy;
+        if (!force) continue;
         const CellWeights& w = body_.weights[points.slot[p]];
-        for (int k = 0; k < 4; ++k)
-            force[points.node[p][k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
+        const auto node = points.node[p];
+        for (std::size_t k = 0; k < node.size(); ++k)
+            (*force)[node[k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
     }
-    for (const Alone& a : alone_) {
-        const Vec2 pull = a.stiffness * crosswise(a.point, displacement);
-        for (int k = 0; k < 4; ++k) force[points.node[a.point][k]] -= crosswise_sign[k] * pull;
+    for (std::size_t i = from.alone; i < to.alone; ++i) {
+        const Alone& a = alone_[i];
+        const Vec2 apart = crosswise(a.point, displacement);
+        energy += 0.5 * a.stiffness * apart.squaredNorm();
+        for (int k = 0; k < 4 && force; ++k) (*force)[points.node[a.point][k]] -= crosswise_sign[k] * a.stiffness * apart;
     }
+    return energy;
+}
+
+void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, Team& team) const {
+    strips_.each(team, [&](int strip) { visit(strip, displacement, &force); });
+}
+
+void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+    Team alone(1);
+    add(displacement, force, alone);
 }
 
 double InternalForce::energy(const std::vector<Vec2>& displacement) const {
-    const Points& points = body_.points;
-    double sum = visit_whole_cells(displacement, nullptr);
-    for (const int p : loose_points_)
-        sum += points.volume[p] *
-               elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_).energy;
-    for (const Alone& a : alone_) sum += 0.5 * a.stiffness * crosswise(a.point, displacement).squaredNorm();
+    double sum = 0.0;
+    for (int strip = 0; strip < strips_.count(); ++strip) sum += visit(strip, displacement, nullptr);
     return sum;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/discretisation.hpp"
+#include "forward/strips.hpp"
 
 #include <array>
 #include <vector>
@@ -8,13 +8,15 @@
 namespace crampfit {
 
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
-/// displacements. Cells that hold all their points on four common fields are taken a cell at a time, side by side; the others,
+/// displacements. Cells that hold all their points on common fields are taken a cell at a time, side by side; the others,
 /// next to a crack or a cutout, point by point.
 ///
 /// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
 /// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient
 /// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
-/// u_2 + u_3|^2. A straight line among displacements does not feel it.
+/// u_2 + u_3|^2. A straight line among displacements does not feel it. (B-splines reach on into cells with more points.)
+///
+/// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
   public:
     static constexpr std::array<double, 4> crosswise_sign{1.0, -1.0, -1.0, 1.0};  // of a cell's nodes
@@ -24,7 +26,8 @@ class InternalForce {
     /// Call after points changed their fields.
     void sort_cells();
 
-    void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+    void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, Team& team) const;
+    void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;  // on one thread
 
     /// Second derivative of the energy of points that follow each other on the same fields, by these fields' displacements [N/m];
     /// `geometric` as in `elastic_tangent`.
@@ -44,18 +47,27 @@ class InternalForce {
     double energy(const std::vector<Vec2>& displacement) const;
 
   private:
-    // Adds the forces of the whole cells, or, without `force`, returns their strain energy [J].
-    template <int PointsPerCell, bool Rotates>
-    double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    struct Place {  // in the lists below
+        std::size_t whole_cell, loose_point, alone;
+    };
+
+    // Adds the forces of a strip's points, or, without `force`, returns their strain energy [J].
+    double visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    template <int PointsPerCell>
+    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    template <int Nodes, int PointsPerCell, bool Rotates>
+    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
     const Discretisation& body_;
     bool rotates_;
-    std::vector<Alone> alone_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
+    std::vector<Alone> alone_;
+    Strips strips_;
+    std::vector<Place> first_of_strip_;  // [strips + 1]
 };
 
 } // namespace crampfit

@@ -40,11 +40,23 @@ void refuse(const Scene& scene, const std::string& key, const std::string& value
     throw InputError(scene.file.string(), key, value, rule);
 }
 
+bool starts_in_motion(const Scene& scene) {
+    const auto& parts = scene.specimen.parts;
+    return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return !part.velocity.isZero(0.0); });
+}
+
 void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     const std::string other = quasistatic ? "quasistatic" : "explicit";
-    if (scene.solver.shape_function == ShapeFunction::bspline2 || scene.solver.shape_function == ShapeFunction::cpdi)
-        refuse(scene, "solver.shape_function", scene.solver.shape_function == ShapeFunction::cpdi ? "cpdi" : "bspline2",
-               "not available in this version; use \"auto\", \"gimp\" or \"linear\"");
+    if (quasistatic && scene.solver.shape_function == ShapeFunction::bspline2)
+        refuse(scene, "solver.shape_function", "bspline2",
+               "not available at equilibrium; use \"auto\", \"gimp\", \"cpdi\" or \"linear\", or solver.kind = \"explicit\"");
+    if (quasistatic && scene.solver.velocity_update != VelocityUpdate::automatic)
+        refuse(scene, "solver.velocity_update", "given", "equilibrium has no velocities to update; leave it out");
+    if (quasistatic && scene.solver.stress_update != StressUpdate::last)
+        refuse(scene, "solver.stress_update", "given", "equilibrium has no time step; leave it out");
+    if (quasistatic && (starts_in_motion(scene) || scene.specimen.parts.size() > 1))
+        refuse(scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
+               "parts that start with a velocity or push on one another are for explicit dynamics; give solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.damping > 0.0)
         refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping), "equilibrium has no motion to damp; leave it out");
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
@@ -73,7 +85,7 @@ double highest_frequency_squared(const Discretisation& body) {
     std::vector<double> widest;
     for (const CellWeights& w : body.weights) {
         spread.emplace_back(Eigen::Matrix3d::Zero());
-        for (int k = 0; k < 4; ++k) {
+        for (int k = 0; k < body.layout.nodes_per_cell(); ++k) {
             Eigen::Matrix<double, 3, 2> B;
             B << w.slope_x[k], 0, 0, w.slope_y[k], w.slope_y[k], w.slope_x[k];
             spread.back() += B * B.transpose() / w.value[k];
@@ -81,15 +93,30 @@ double highest_frequency_squared(const Discretisation& body) {
         widest.push_back(largest(spread.back()));
     }
     double highest = 0.0;
-    for (int p = 0; p < body.points.count(); ++p) {
+    int last = -1;  // a point of the cell that was looked at last
+    for (int c = 0; c < body.layout.cells(); ++c) {
+        const int p = body.points.first_of_cell[c];
+        if (p == body.points.first_of_cell[c + 1]) continue;
         const double density = body.points.density(p);
-        const int slot = body.points.slot[p];
+        const int first_slot = body.points.slot[p] - body.place_of(p);
+        const auto alike = [&](int q) {
+            return body.points.stiffness[body.points.cell[q]] == body.points.stiffness[c] && body.points.density(q) == density &&
+                   body.points.slot[q] - body.place_of(q) == first_slot;
+        };
+        if (last >= 0 && alike(last)) continue;
+        last = p;
         const Eigen::Matrix3d C = body.points.stiffness_of(p);
-        if (C.trace() * widest[slot] / density <= highest) continue;  // a bound: spares most points the eigenvalues
-        const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(C).operatorSqrt();
-        highest = std::max(highest, largest(root * spread[slot] * root) / density);
+        for (int slot = first_slot; slot < first_slot + body.layout.points_per_cell(); ++slot) {
+            if (C.trace() * widest[slot] / density <= highest) continue;  // a bound: spares most cells the eigenvalues
+            const Eigen::Matrix3d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(C).operatorSqrt();
+            highest = std::max(highest, largest(root * spread[slot] * root) / density);
+        }
     }
     return highest;
+}
+
+std::string name_of(ShapeFunction kind) {
+    return kind == ShapeFunction::linear ? "linear" : kind == ShapeFunction::cpdi ? "CPDI" : "GIMP";
 }
 
 double speed_of(const Edge& edge) { return std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)); }
@@ -116,6 +143,8 @@ double farthest_motion(const Scene& scene, double end) {
     };
     std::for_each(scene.edges.begin(), scene.edges.end(), consider);
     std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
+    for (const Part& part : scene.specimen.parts)
+        if (!part.velocity.isZero(0.0)) farthest = std::max(farthest, part.velocity.norm() * end);
     return farthest;
 }
 
@@ -155,6 +184,32 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
+// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A / mu,
+// against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
+void choose_updates(const Scene& scene, Plan& plan) {
+    const SolverChoice& solver = scene.solver;
+    std::string how = "kept by the grid";
+    std::string why = "points stay in their cells: mapping to points and back would only lose";
+    if (solver.velocity_update != VelocityUpdate::automatic) why = "asked for in solver.velocity_update";
+    switch (solver.velocity_update) {
+        case VelocityUpdate::automatic: break;
+        case VelocityUpdate::flip: how = fmt::format("FLIP, {:g} of it PIC", solver.pic_share); break;
+        case VelocityUpdate::pic:
+            how = "PIC, time step shorter by the root of 2";
+            plan.time_step /= std::sqrt(2.0);
+            break;
+        case VelocityUpdate::xpic: how = fmt::format("XPIC({})", solver.order); break;
+        case VelocityUpdate::fmpm:
+            how = fmt::format("FMPM({}), time step shorter by the root of twice its order", solver.order);
+            plan.time_step /= std::sqrt(2.0 * solver.order);
+            break;
+    }
+    plan.choices.push_back({"velocities", how, why});
+    if (solver.stress_update != StressUpdate::last)
+        plan.choices.push_back({"stresses", solver.stress_update == StressUpdate::first ? "updated first" : "updated first and last by half a step each",
+                                "asked for in solver.stress_update"});
+}
+
 } // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -180,7 +235,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         plan.free_bodies |= rigid.free[0] || rigid.free[1];
     }
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 &&
+                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
                         (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
 
@@ -198,6 +253,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
+        : starts_in_motion(scene) ? "a part starts in motion"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
@@ -216,8 +272,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                           : "solver.extrapolate is false");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
-    choose("shape function", scene.solver.shape_function == ShapeFunction::linear ? "linear" : "GIMP",
-           "in the undeformed specimen a point's domain lies in one cell, where linear and GIMP weights are the same");
+    if (scene.solver.shape_function == ShapeFunction::bspline2)
+        choose("shape function", "quadratic B-splines, knots threefold at the specimen's sides", "asked for");
+    else
+        choose("shape function", name_of(scene.solver.shape_function),
+               "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
     choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
            fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
                        expected / smallest, most_rotation));
@@ -238,6 +297,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         choose("growth", fmt::format("{} tips compete", tips),
                "the tip moves whose next advance pays for itself at the least load, tips that nothing tells apart together; which one "
                "depends on the toughness, so that each other toughness needs a run of its own");
+    const bool parts_touch = scene.specimen.parts.size() > 1;
+    if (parts_touch) choose("parts", fmt::format("{}, which push on one another without friction", scene.specimen.parts.size()), "given in specimen.parts");
     choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
     if (plan.friction)
@@ -248,8 +309,9 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.quasistatic) return plan;
 
     const double highest = highest_frequency_squared(body);
-    plan.added_frequency_squared = plan.contact || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
+    plan.added_frequency_squared = plan.contact || parts_touch || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
+    choose_updates(scene, plan);
     return plan;
 }
 

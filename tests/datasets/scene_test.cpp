@@ -175,6 +175,58 @@ TEST(UnitScene, Extrapolate) {
                  [&] { folder.parse(plain_scene + "\n[solver]\nextrapolat = true\n"); });
 }
 
+// How an explicit step updates velocities and stresses.
+TEST(UnitScene, Updates) {
+    const SceneFolder folder;
+    const auto with = [](const std::string& keys) { return plain_scene + "\n[solver]\n" + keys + "\n"; };
+    EXPECT_EQ(folder.parse(plain_scene).solver.velocity_update, VelocityUpdate::automatic);
+    EXPECT_EQ(folder.parse(plain_scene).solver.stress_update, StressUpdate::last);
+    const SolverChoice flip = folder.parse(with("velocity_update = \"flip\"\npic_share = \"5 %\"\nstress_update = \"first\"")).solver;
+    EXPECT_EQ(flip.velocity_update, VelocityUpdate::flip);
+    EXPECT_DOUBLE_EQ(flip.pic_share, 0.05);
+    EXPECT_EQ(flip.stress_update, StressUpdate::first);
+    const SolverChoice fmpm = folder.parse(with("velocity_update = \"fmpm\"\norder = 4\nstress_update = \"average\"")).solver;
+    EXPECT_EQ(fmpm.velocity_update, VelocityUpdate::fmpm);
+    EXPECT_EQ(fmpm.order, 4);
+    EXPECT_EQ(fmpm.stress_update, StressUpdate::average);
+    EXPECT_EQ(folder.parse(with("velocity_update = \"xpic\"")).solver.order, 2);
+    const std::string file = (folder / "scene.toml").string();
+    const auto refused = [&](const std::string& keys, const std::string& key, const std::string& rule) {
+        expect_error(file, key, rule, [&] { folder.parse(with(keys)); });
+    };
+    refused("velocity_update = \"flipp\"", "solver.velocity_update", "did you mean \"flip\"?");
+    refused("stress_update = \"middle\"", "solver.stress_update", "must be one of");
+    refused("velocity_update = \"flip\"\norder = 2", "solver.order", "belongs to");
+    refused("velocity_update = \"fmpm\"\norder = 0", "solver.order", "");
+    refused("pic_share = 0.1", "solver.pic_share", "belongs to");
+    refused("velocity_update = \"flip\"\npic_share = 1.5", "solver.pic_share", "between 0 and 1");
+}
+
+// Pieces that start with a velocity need no edge, but then a time to stop at.
+TEST(UnitScene, Parts) {
+    const SceneFolder folder;
+    const std::string parts = "parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, velocity = [\"5 m/s\", \"0 m/s\"] },\n"
+                              "          { polygon = [[\"6 mm\", \"1 mm\"], [\"9 mm\", \"1 mm\"], [\"9 mm\", \"5 mm\"]] } ]\n";
+    const auto scene = [&](const std::string& more, const std::string& stop) {
+        return "[model]\nplane = \"strain\"\nthickness = \"1 mm\"\ncell = \"0.5 mm\"\n[specimen]\nsize = [\"10 mm\", \"6 mm\"]\n"
+               "material = \"EW\"\n" + more + "[materials.EW]\nE = \"40 MPa\"\nnu = 0.3\ndensity = \"300 kg/m^3\"\n"
+               "toughness = \"100 J/m^2\"\n[stop]\n" + stop + "\n";
+    };
+    const Scene two = folder.parse(scene(parts, "time = \"1 ms\""));
+    ASSERT_EQ(two.specimen.parts.size(), 2u);
+    EXPECT_EQ(two.specimen.parts[0].velocity, Vec2(5, 0));
+    EXPECT_EQ(two.specimen.parts[1].velocity, Vec2(0, 0));
+    EXPECT_EQ(std::get<Polygon>(two.specimen.parts[1].shape).points.size(), 3u);
+    const std::string file = (folder / "scene.toml").string();
+    expect_error(file, "stop", "by time alone", [&] { folder.parse(scene(parts, "displacement = \"1 mm\"")); });
+    expect_error(file, "specimen.parts.0.speed", "unknown key", [&] {
+        folder.parse(scene("parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, speed = 1 } ]\n", "time = \"1 ms\""));
+    });
+    expect_error(file, "measure.force", "nothing loads the specimen", [&] {
+        folder.parse(scene("parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" } } ]\n", "time = \"1 ms\""));
+    });
+}
+
 TEST(UnitScene, FileOnDisk) {
     const SceneFolder folder;
     EXPECT_EQ(read_scene(folder.write("windows.toml", "\xEF\xBB\xBF" + plain_scene)).edges.size(), 2U);

@@ -35,7 +35,7 @@ Matrix stiffness(const AtRest& run) {
     }
     const InternalForce internal(run.body, false);
     for (const auto& alone : internal.alone()) {
-        const auto& node = points.node[alone.point];
+        const auto node = points.node[alone.point];
         const auto& sign = InternalForce::crosswise_sign;
         for (int axis = 0; axis < 2; ++axis)
             for (int a = 0; a < 4; ++a)

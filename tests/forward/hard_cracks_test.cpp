@@ -65,8 +65,8 @@ TEST(HardField, OnePointBehindIt) {
         Discretisation body(scene, materials);
         const CrackFields cracks(scene, body, materials, 1e-3);
         std::vector<int> points(cracks.fields(), 0);
-        for (const auto& nodes : body.points.node)
-            for (const int field : nodes) ++points[field];
+        for (int p = 0; p < body.points.count(); ++p)
+            for (const int field : body.points.node[p]) ++points[field];
         const std::vector<double> mass = field_masses(body, cracks.fields());
         double share = 1.0;
         bool one = false;

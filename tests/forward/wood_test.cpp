@@ -10,7 +10,7 @@ namespace crampfit::test {
 namespace {
 
 TEST(UnitShapeFunctions, AddUpToOneAndReproduceALine) {
-    for (const ShapeFunction kind : {ShapeFunction::linear, ShapeFunction::gimp}) {
+    for (const ShapeFunction kind : {ShapeFunction::linear, ShapeFunction::gimp, ShapeFunction::cpdi}) {
         const Vec2 cell(0.3, 0.2), half(0.075, 0.05), place(0.075, 0.15);
         const CellWeights w = cell_weights(kind, place, cell, half);
         double sum = 0, x = 0, y = 0, slope = 0;
@@ -25,6 +25,54 @@ TEST(UnitShapeFunctions, AddUpToOneAndReproduceALine) {
         EXPECT_NEAR(y, place.y(), 1e-14);
         EXPECT_NEAR(slope, 1.0, 1e-13);
     }
+}
+
+TEST(UnitShapeFunctions, SplinesAddUpToOneAndReproduceALineEverywhere) {
+    // A line's coefficients are its values at the nodes (Greville), at the ends of the grid too.
+    for (const int cells : {1, 2, 5}) {
+        for (const int per_side : {1, 2, 3}) {
+            Scene scene = block({cells * 0.3, 3 * 0.2}, 0.25);
+            scene.model.points_per_cell = per_side * per_side;
+            scene.solver.shape_function = ShapeFunction::bspline2;
+            const MaterialMap materials(scene);
+            const Discretisation body(scene, materials);
+            const Layout& layout = body.layout;
+            ASSERT_EQ(layout.nodes(), (layout.cells_x + 2) * (layout.cells_y + 2));
+            for (int p = 0; p < body.points.count(); ++p) {
+                const CellWeights& w = body.weights[body.points.slot[p]];
+                double sum = 0;
+                Vec2 x = Vec2::Zero();
+                Mat2 slope = Mat2::Zero();
+                for (int k = 0; k < layout.nodes_per_cell(); ++k) {
+                    const Vec2 node = layout.node_position(body.points.node[p][k]);
+                    EXPECT_GE(w.value[k], 0.0);
+                    EXPECT_TRUE(layout.support(body.points.node[p][k]).contains(body.points.position[p]));
+                    sum += w.value[k];
+                    x += w.value[k] * node;
+                    slope += node * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
+                }
+                EXPECT_NEAR(sum, 1.0, 1e-14);
+                EXPECT_LT((x - body.points.position[p]).norm(), 1e-14);
+                EXPECT_LT((slope - Mat2::Identity()).norm(), 1e-12);
+            }
+        }
+    }
+}
+
+TEST(UnitShapeFunctions, SplinesAreSmoothFromCellToCell) {
+    // Value and slope of the splines that two neighbouring cells share agree at the line between them; also next to the grid's end.
+    const double h = 0.3;
+    for (const bool first : {false, true}) {
+        const auto left = spline_weights(h, h, {first, false});
+        const auto right = spline_weights(0.0, h, {false, false});
+        EXPECT_NEAR(left[0].value, 0.0, 1e-15);
+        EXPECT_NEAR(left[0].slope, 0.0, 1e-14);
+        for (int k = 0; k < 2; ++k) {
+            EXPECT_NEAR(left[k + 1].value, right[k].value, 1e-15);
+            EXPECT_NEAR(left[k + 1].slope, right[k].slope, 1e-14);
+        }
+    }
+    EXPECT_EQ(spline_weights(0.0, h, {true, false})[0].value, 1.0);  // the outermost alone has a value at the end
 }
 
 TEST(UnitShapeFunctions, GimpIsTheMeanOfTheHatOverThePointsDomain) {

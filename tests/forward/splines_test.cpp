@@ -1,0 +1,68 @@
+// Cracks, cutouts and edges on the nine nodes of quadratic B-splines; what does without them is in vibration_test and wood_test.
+#include "benchmarks/speed_error.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::test {
+namespace {
+
+TEST(VerificationSplineCrack, EnergyReleaseRateAndIntensityFactors) {
+    // Infinite plate (Westergaard 1939) and strip (Rice 1968) in damped motion. Bars: those of the solver's own shape functions.
+    int runs = 0;
+    for (const BenchRun& run : bench_runs()) {
+        if (run.options.find("B-splines") == std::string::npos || run.cells > 5.0) continue;
+        const SpeedError row = measure(run);
+        std::printf("B-splines, %s, %s, %g cells: off by %+.2f %%\n", row.problem.c_str(), row.quantity.c_str(), row.cells, 100 * row.error);
+        EXPECT_LT(std::abs(row.error), 0.04) << row.problem;
+        ++runs;
+    }
+    EXPECT_GE(runs, 3);
+}
+
+TEST(VerificationSplineCrack, BooksCloseWhileItGrows) {
+    Scene scene = block({12e-3, 6e-3}, 0.25e-3);
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.solver.shape_function = ShapeFunction::bspline2;
+    scene.specimen.cutouts = {Circle{{8e-3, 4.5e-3}, 0.6e-3}};
+    scene.edges = {moving("top", Side::top, {0.0, 4.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 3e-3), Vec2(3e-3, 3e-3)};
+    crack.grows = Growth::end;
+    crack.direction = GrowthDirection::straight;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.crack_length = 7e-3;
+    const Record record = simulate(scene);
+    std::printf("B-splines, crack grows from 3 to %.2f mm in %ld steps, energy books %.2f %%\n", 1e3 * record.series.back().crack_length,
+                record.steps, 100 * record.worst_energy_imbalance);
+    EXPECT_EQ(record.status, RunStatus::finished) << record.message;
+    EXPECT_GT(record.series.back().crack_length, 6.9e-3);
+    EXPECT_NEAR(record.series.back().fracture_energy, 100.0 * 4e-3, 0.1 * 100.0 * 4e-3);
+    EXPECT_LT(record.worst_energy_imbalance, 0.1);
+}
+
+TEST(VerificationSplines, BlockUnderTractionStrainsEvenly) {
+    // A patch test on a grid whose sides have splines of their own: uniform stress, u = s (1 - nu^2) / E y from the floor on.
+    Scene scene = block({5e-3, 4e-3}, 1e-3);
+    scene.materials["EW"].poisson_ratio = 0.0;
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.solver.shape_function = ShapeFunction::bspline2;
+    scene.solver.damping = 2e5;
+    scene.edges = {without(moving("floor", Side::bottom, {0.0, 0.0}), 0), pulled("top", Side::top, {0.0, 4e4})};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 1e-3;
+    Trial run(scene);
+    run.until(1e-3);
+    for (int p = 0; p < run.body.points.count(); ++p) {
+        const Mat2 gradient = gradient_at(run.body, p, run.solver.displacements());
+        EXPECT_NEAR(gradient(1, 1), 1e-3, 1e-9);
+        EXPECT_NEAR(gradient(0, 0), 0.0, 1e-9);
+    }
+}
+
+} // namespace
+} // namespace crampfit::test
