@@ -5,7 +5,9 @@
 #include "forward/energy_release.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/plan.hpp"
+#include "forward/tip_ties.hpp"
 
+#include <limits>
 #include <vector>
 
 namespace crampfit {
@@ -30,15 +32,16 @@ class ExplicitSolver {
     /// One time step.
     void step();
 
-    /// Lets each growing tip advance where the energy release rate has reached the toughness.
+    /// Lets each growing tip go on until it has taken up as much energy as the toughness asks for, but no faster than a Rayleigh wave
+    /// in the wood at the tip (Freund 1990). Before every step.
     void grow_cracks();
 
     TipLoad load_at(int crack, bool at_end) const;
     EnergyBooks energies() const;
+    double fastest_crack() const { return fastest_crack_; }  // of growing tips, over a cell [m/s]
     double time() const { return time_; }
     const CrackFields& cracks() const { return cracks_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
-    const std::vector<TipLoad>& tip_loads() const { return tip_loads_; }  // latest, two a crack: start, end
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
     const std::vector<Vec2>& reactions() const { return reaction_; }
@@ -48,17 +51,23 @@ class ExplicitSolver {
     bool has_left(int crack, bool at_end) const { return !cracks_.lines[crack].tip(at_end).inside; }
 
   private:
+    struct Tip {
+        double allowed = std::numeric_limits<double>::infinity();      // how far a Rayleigh wave leaves it to go at once [m]
+        double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
+        double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
+        double noted_at = 0;                                           // [s]
+    };
     void place_bodies();
     void adopt(const std::vector<CrackFields::NewField>& fields);
     Vec2 mean_velocity_of(int driver) const;
 
     void surface_forces();
-    void tie_forces();
     void advance_velocities();
     void close_crack_faces();
     void prescribe_velocities();
     void advance_displacements();
-    double tie_stiffness(const FieldPair& pair) const;
+    void grow(int crack, bool at_end);
+    void note_speed(Tip& state, double way);
 
     const Scene& scene_;
     const Plan& plan_;
@@ -67,6 +76,7 @@ class ExplicitSolver {
     CrackFields cracks_;
     Boundary boundary_;
     InternalForce internal_force_;
+    TipTies ties_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
 
@@ -78,8 +88,8 @@ class ExplicitSolver {
     std::vector<Vec2> force_;         // [N]
 
     std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
-    std::vector<TipLoad> tip_loads_;
-    std::vector<double> last_growth_; // [two a crack] [s]
+    std::vector<Tip> tips_;           // two a crack: start, end
+    double fastest_crack_ = 0;        // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
 };

@@ -42,6 +42,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
     boundary_.hold_further_fields(cracks_);
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
+    ties_.take_in(cracks_, mass_, displacement_, false);
 }
 
 } // namespace crampfit

@@ -14,8 +14,6 @@ namespace crampfit {
 
 namespace {
 
-// How often cracks are looked at: the tip then moves by a quarter of a cell at most this often.
-constexpr int steps_between_looks = 2;
 constexpr int steps_between_reports = 64;
 
 bool reached(const Stop& stop, const Instant& now) {
@@ -97,7 +95,6 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     ExplicitSolver solver(scene, plan, materials, body);
     Recorder recorder(scene, plan, body, solver);
     for (long step = 0;; ++step) {
-        if (plan.grows && step % steps_between_looks == 0) solver.grow_cracks();
         recorder.look();
         if (!recorder.is_finite()) {
             recorder.finish(RunStatus::unstable, "a displacement became infinite");
@@ -117,6 +114,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         }
         if (options.progress && step % steps_between_reports == 0)
             options.progress({recorder.fraction(), solver.time(), recorder.now().crack_length, step});
+        if (plan.grows) solver.grow_cracks();
         solver.step();
         recorder.add_step();
     }

@@ -1,0 +1,63 @@
+#include "forward/explicit.hpp"
+#include "forward/growth.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+namespace {
+
+// A tip asks for its direction anew after this part of a cell.
+constexpr double leg_in_cells = 0.25;
+
+// A shorter way than this part of a cell waits for the next step.
+constexpr double least_way_in_cells = 1e-4;
+
+} // namespace
+
+void ExplicitSolver::grow_cracks() {
+    for (int k = 0; k < static_cast<int>(cracks_.lines.size()); ++k)
+        for (const bool at_end : {false, true})
+            if (cracks_.lines[k].tip(at_end).grows && cracks_.lines[k].tip(at_end).inside) grow(k, at_end);
+}
+
+void ExplicitSolver::grow(int crack, bool at_end) {
+    const CrackTip& tip = cracks_.lines[crack].tip(at_end);
+    Tip& state = tips_[2 * crack + at_end];
+    const double cell = body_.layout.cell.minCoeff();
+    const LocalWood wood = materials_.at(tip.position);
+    // On a grid a tip goes from pair to pair by fits and starts: it is over a cell that it must not outrun the wave.
+    const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
+    state.allowed = std::min(cell, state.allowed + rayleigh * plan_.time_step);
+
+    double way = 0.0;
+    if (ties_.holds(cracks_, crack, at_end))
+        way = ties_.balanced_way(cracks_, crack, at_end, wood.toughness, state.allowed, displacement_, velocity_, plan_.time_step);
+    else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides
+        way = std::min(state.allowed, leg_in_cells * cell);
+    if (way < least_way_in_cells * cell) return;
+
+    Vec2 direction = tip.direction;
+    if (state.since_turn >= leg_in_cells * cell) {
+        direction = growth_direction(scene_.cracks[crack].direction, tip, load_at(crack, at_end), materials_, leg_in_cells * cell);
+        state.since_turn = 0.0;
+    }
+    state.since_turn += way;
+    state.allowed -= way;
+    note_speed(state, way);
+    books_.fracture += wood.toughness * way * body_.layout.thickness;
+    if (direction == tip.direction && cracks_.slide(crack, at_end, way)) ties_.take_in(cracks_, mass_, displacement_, false);
+    else adopt(cracks_.grow(crack, at_end, tip.position + way * direction));
+}
+
+// Mean speeds over whole cells, or a little more.
+void ExplicitSolver::note_speed(Tip& state, double way) {
+    state.since_noted += way;
+    if (state.since_noted < body_.layout.cell.minCoeff()) return;
+    if (std::isfinite(state.since_noted)) fastest_crack_ = std::max(fastest_crack_, state.since_noted / (time_ - state.noted_at));
+    state.since_noted = 0.0;
+    state.noted_at = time_;
+}
+
+} // namespace crampfit
