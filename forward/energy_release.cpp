@@ -331,6 +331,10 @@ bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const
 
 } // namespace
 
+Vec2 opening_behind(const CrackFields& cracks, int crack, bool at_end, double cell, const std::vector<Vec2>& displacement) {
+    return cracks.opening(crack, cracks.lines[crack].behind(at_end, 1.5 * cell), displacement);
+}
+
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options) {
     const CrackLine& line = cracks.lines[crack];
@@ -343,7 +347,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     load.toughness = wood.toughness;
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     load.G = J.G;
-    load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
+    load.opening = opening_behind(cracks, crack, at_end, h, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, line, at_end, field, extension, state, options.rotates);

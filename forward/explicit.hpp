@@ -55,6 +55,7 @@ class ExplicitSolver {
         double allowed = std::numeric_limits<double>::infinity();      // how far a Rayleigh wave leaves it to go at once [m]
         double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
         double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
+        Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
         double noted_at = 0;                                           // [s]
     };
     void place_bodies();

@@ -11,6 +11,10 @@ namespace {
 // A tip asks for its direction anew after this part of a cell.
 constexpr double leg_in_cells = 0.25;
 
+// The opening that gives a direction is a mean over the time in which a Rayleigh wave goes so many cells, the reach of J's domain:
+// pairs swing as they are freed, and the way of a crack must not hang on in which part of a swing it was asked for.
+constexpr double cells_in_mean = 4.0;
+
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
 
@@ -31,6 +35,9 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
     state.allowed = std::min(cell, state.allowed + rayleigh * plan_.time_step);
 
+    const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
+    state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
+
     double way = 0.0;
     if (ties_.holds(cracks_, crack, at_end))
         way = ties_.balanced_way(cracks_, crack, at_end, wood.toughness, state.allowed, displacement_, velocity_, plan_.time_step);
@@ -40,7 +47,9 @@ void ExplicitSolver::grow(int crack, bool at_end) {
 
     Vec2 direction = tip.direction;
     if (state.since_turn >= leg_in_cells * cell) {
-        direction = growth_direction(scene_.cracks[crack].direction, tip, load_at(crack, at_end), materials_, leg_in_cells * cell);
+        TipLoad load = load_at(crack, at_end);
+        load.opening = state.opening;
+        direction = growth_direction(scene_.cracks[crack].direction, tip, load, materials_, leg_in_cells * cell);
         state.since_turn = 0.0;
     }
     state.since_turn += way;
