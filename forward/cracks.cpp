@@ -41,6 +41,14 @@ double length_inside(const std::vector<Vec2>& points, const Box& box) {
 
 } // namespace
 
+double share_freed(const Vec2& node, const CrackTip& tip, const Vec2& cell) {
+    // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
+    // and would free the nodes far off an oblique crack too early.
+    const Vec2 cell_along = tip.direction.cwiseProduct(cell);
+    const double ahead = (node - tip.position).dot(tip.direction) + tip_lag * cell_along.norm();
+    return 0.5 - ahead / cell_along.lpNorm<1>();
+}
+
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along) {
     const LocalWood wood = materials.average(centre, half);
     if (!materials.orthotropic() || wood.filled == 0.0) return wood.plane_modulus();
@@ -144,11 +152,7 @@ double CrackFields::freed(int crack, int node) const {
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
         if (!tip->inside) continue;
         if (!exit_distance(tip->position, tip->direction, support)) continue;
-        // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
-        // and would free the nodes far off an oblique crack too early.
-        const Vec2 cell_along = tip->direction.cwiseProduct(body_->layout.cell);
-        const double ahead = (x - tip->position).dot(tip->direction) + tip_lag * cell_along.norm();
-        least = std::min(least, 0.5 - ahead / cell_along.lpNorm<1>());
+        least = std::min(least, share_freed(x, *tip, body_->layout.cell));
     }
     return least;
 }

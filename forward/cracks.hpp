@@ -47,6 +47,9 @@ struct FieldPair {
     double tie;       // stiffness that still holds the pair together [N/m]; 0 once the pair is free
 };
 
+/// Share of its way past a node, over the width of a cell, that a tip has gone: below 0 before, above 1 after.
+double share_freed(const Vec2& node, const CrackTip& tip, const Vec2& cell);
+
 /// E' of the wood of a small area as a crack that runs along a direction sees it, G = K_I^2 / E' [Pa].
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along);
 

@@ -5,9 +5,11 @@
 #include "forward/energy_release.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/plan.hpp"
+#include "forward/tip_patch.hpp"
 #include "forward/tip_ties.hpp"
 
 #include <limits>
+#include <memory>
 #include <vector>
 
 namespace crampfit {
@@ -56,10 +58,13 @@ class ExplicitSolver {
         double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
         double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
         Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
+        std::unique_ptr<TipPatch> patch;                               // as of some time ago
+        double since_patch = 0;                                        // how far it has gone since that was made [m]
+        Vec2 patch_direction = Vec2::Zero();                           // then
         double noted_at = 0;                                           // [s]
     };
     void place_bodies();
-    void adopt(const std::vector<CrackFields::NewField>& fields);
+    void adopt(const std::vector<CrackFields::NewField>& fields, double softness);
     Vec2 mean_velocity_of(int driver) const;
 
     void surface_forces();
@@ -68,6 +73,8 @@ class ExplicitSolver {
     void prescribe_velocities();
     void advance_displacements();
     void grow(int crack, bool at_end);
+    TipPatch& patch_of(int crack, bool at_end);
+    double toughness_to_overcome(int crack, bool at_end, double here);
     void note_speed(Tip& state, double way);
 
     const Scene& scene_;

@@ -1,3 +1,4 @@
+#include "forward/crack_driving.hpp"
 #include "forward/explicit.hpp"
 #include "forward/growth.hpp"
 
@@ -14,6 +15,9 @@ constexpr double leg_in_cells = 0.25;
 // The opening that gives a direction is a mean over the time in which a Rayleigh wave goes so many cells, the reach of J's domain:
 // pairs swing as they are freed, and the way of a crack must not hang on in which part of a swing it was asked for.
 constexpr double cells_in_mean = 4.0;
+
+// A patch about a tip is good while the tip keeps its direction by 10 degrees.
+constexpr double most_turn_cosine = 0.985;
 
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
@@ -40,7 +44,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
 
     double way = 0.0;
     if (ties_.holds(cracks_, crack, at_end))
-        way = ties_.balanced_way(cracks_, crack, at_end, wood.toughness, state.allowed, displacement_, velocity_, plan_.time_step);
+        way = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed, displacement_, velocity_, plan_.time_step);
     else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides
         way = std::min(state.allowed, leg_in_cells * cell);
     if (way < least_way_in_cells * cell) return;
@@ -53,11 +57,37 @@ void ExplicitSolver::grow(int crack, bool at_end) {
         state.since_turn = 0.0;
     }
     state.since_turn += way;
+    state.since_patch += way;
     state.allowed -= way;
     note_speed(state, way);
     books_.fracture += wood.toughness * way * body_.layout.thickness;
-    if (direction == tip.direction && cracks_.slide(crack, at_end, way)) ties_.take_in(cracks_, mass_, displacement_, false);
-    else adopt(cracks_.grow(crack, at_end, tip.position + way * direction));
+    if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
+        ties_.take_in(cracks_, mass_, displacement_, false);
+    } else {
+        const double softness = materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
+        adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
+    }
+}
+
+TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
+    const CrackTip& tip = cracks_.lines[crack].tip(at_end);
+    const double cell = body_.layout.cell.maxCoeff();
+    Tip& state = tips_[2 * crack + at_end];
+    if (!state.patch || state.since_patch > cell || state.patch_direction.dot(tip.direction) < most_turn_cosine) {
+        state.patch = std::make_unique<TipPatch>(body_, cracks_, boundary_, crack, at_end, std::max(cell, scene_.cracks[crack].advance), cell);
+        state.since_patch = 0.0;
+        state.patch_direction = tip.direction;
+    }
+    return *state.patch;
+}
+
+// What the next cell must take up on average so that the next `advance` takes up its mean toughness [J/m^2].
+double ExplicitSolver::toughness_to_overcome(int crack, bool at_end, double here) {
+    const double advance = scene_.cracks[crack].advance;
+    if (advance <= body_.layout.cell.maxCoeff()) return here;
+    const CrackTip& tip = cracks_.lines[crack].tip(at_end);
+    const double share = patch_of(crack, at_end).local_share(tips_[2 * crack + at_end].since_patch, displacement_);
+    return mean_toughness(materials_, {tip.position, tip.position + advance * tip.direction}) * share;
 }
 
 // Mean speeds over whole cells, or a little more.

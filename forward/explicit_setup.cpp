@@ -32,7 +32,7 @@ Vec2 ExplicitSolver::mean_velocity_of(int driver) const {
            std::clamp((boundary_.travel_time(driver) - time_) / plan_.time_step, 0.0, 1.0);
 }
 
-void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
+void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {
     for (const auto& [added, from] : fields) {
         displacement_.push_back(displacement_[from]);
         velocity_.push_back(velocity_[from]);
@@ -42,7 +42,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
     boundary_.hold_further_fields(cracks_);
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
-    ties_.take_in(cracks_, mass_, displacement_, false);
+    ties_.take_in(cracks_, mass_, displacement_, false, softness);
 }
 
 } // namespace crampfit

@@ -21,7 +21,8 @@ double TipTies::stiffness(const Tie& tie, double f) const { return (1.0 - f) / (
 // The way on which a tip frees a pair [m], as `CrackFields` has it.
 double TipTies::width(const CrackTip& tip) const { return tip.direction.cwiseProduct(cell_).lpNorm<1>(); }
 
-void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest) {
+void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest,
+                      double softness) {
     const std::size_t known = ties_.size();
     ties_.resize(cracks.pairs.size());
     live_.clear();
@@ -32,6 +33,7 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
         const double right = mass[pair.right];
         if (k >= known) {
             tie.waits = !at_rest;
+            tie.softness = softness;
             if (!at_rest) tie.from = std::max(0.0, pair.freed);
         }
         if (pair.freed >= 1.0 || left == 0.0 || right == 0.0 || !std::isfinite(pair.compliance)) continue;
@@ -41,7 +43,7 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
         const double f = share(tie, pair.freed);
         const Vec2 jump = jump_of(pair, displacement);
         const Vec2 before = k < known && !tie.waits ? Vec2(stiffness(tie, f) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
-        const double compliance = pair.compliance / shared;
+        const double compliance = tie.softness * pair.compliance / shared;
         const double most = most_frequency_squared_ * left * right / (left + right);
         const double slack = std::max(k < known ? tie.slack : 0.0, (1.0 - f) / (most * compliance) - f);
         if (slack == tie.slack && compliance == tie.compliance) continue;

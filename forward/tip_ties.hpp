@@ -24,8 +24,9 @@ class TipTies {
         : cell_(cell), thickness_(thickness), most_frequency_squared_(most_frequency_squared) {}
 
     /// After a tip has moved or masses have changed. Pairs that are new are held by what holds them now, from the next `pull` on; those
-    /// of the start of a run (`at_rest`) by nothing yet.
-    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest);
+    /// of the start of a run (`at_rest`) by nothing yet. `softness` is that of TipPatch, for new pairs.
+    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest,
+                 double softness = 1.0);
 
     /// Lets the ties that are new hold their pairs together under these forces of the fields [N].
     void settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force);
@@ -49,6 +50,7 @@ class TipTies {
         double from = 0;        // share of the way that the tip had gone when the tie came up
         double compliance = 0;  // c [m/N]
         double slack = 0;       // s
+        double softness = 1;
         Vec2 stretch = Vec2::Zero();  // s c F0 [m]
     };
     double share(const Tie& tie, double freed) const;
