@@ -16,6 +16,11 @@ constexpr double leg_in_cells = 0.25;
 // pairs swing as they are freed, and the way of a crack must not hang on in which part of a swing it was asked for.
 constexpr double cells_in_mean = 4.0;
 
+// How far a tip may be ahead of a Rayleigh wave: a pair that is held back takes up more than the toughness asks for, which the energy
+// books miss (ring specimen at 10 m/s: 0.3 % of the work with one cell, 1.6 % with a half).
+constexpr double most_ahead_in_cells = 1.0;
+constexpr double cells_in_speed = 8.0;  // over which it is told
+
 // A patch about a tip is good while the tip keeps its direction by 10 degrees.
 constexpr double most_turn_cosine = 0.985;
 
@@ -35,9 +40,9 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     Tip& state = tips_[2 * crack + at_end];
     const double cell = body_.layout.cell.minCoeff();
     const LocalWood wood = materials_.at(tip.position);
-    // On a grid a tip goes from pair to pair by fits and starts: it is over a cell that it must not outrun the wave.
+    // On a grid a tip goes from pair to pair by fits and starts: over some cells it must not outrun the wave.
     const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
-    state.allowed = std::min(cell, state.allowed + rayleigh * plan_.time_step);
+    state.allowed = std::min(most_ahead_in_cells * cell, state.allowed + rayleigh * plan_.time_step);
 
     const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
     state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
@@ -52,6 +57,10 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     Vec2 direction = tip.direction;
     if (state.since_turn >= leg_in_cells * cell) {
         TipLoad load = load_at(crack, at_end);
+        const double newest = std::isfinite(state.since_turn) ? leg_in_cells : 1.0;  // a mean over a cell or so
+        state.intensities += newest * (Vec2(load.K_I, load.K_II) - state.intensities);
+        load.K_I = state.intensities[0];
+        load.K_II = state.intensities[1];
         load.opening = state.opening;
         direction = growth_direction(scene_.cracks[crack].direction, tip, load, materials_, leg_in_cells * cell);
         state.since_turn = 0.0;
@@ -90,10 +99,9 @@ double ExplicitSolver::toughness_to_overcome(int crack, bool at_end, double here
     return mean_toughness(materials_, {tip.position, tip.position + advance * tip.direction}) * share;
 }
 
-// Mean speeds over whole cells, or a little more.
 void ExplicitSolver::note_speed(Tip& state, double way) {
     state.since_noted += way;
-    if (state.since_noted < body_.layout.cell.minCoeff()) return;
+    if (state.since_noted < cells_in_speed * body_.layout.cell.minCoeff()) return;
     if (std::isfinite(state.since_noted)) fastest_crack_ = std::max(fastest_crack_, state.since_noted / (time_ - state.noted_at));
     state.since_noted = 0.0;
     state.noted_at = time_;

@@ -227,7 +227,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
                 "two fields at nodes whose support a crack cuts, one elsewhere");
     if (!scene.cracks.empty())
-        choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "every second step at each growing tip", "domain form, 4 cells around the tip");
+        choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "at saved instants and where a crack turns; it grows by the energy that the ties at its tip give up", "domain form, 4 cells around the tip");
     plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                [](const Body& b) { return b.contact.kind == Contact::Kind::frictionless; });
     choose("contact", plan.contact ? "bodies push, without friction, on the specimen's outline" : "none between bodies and specimen",

@@ -6,6 +6,8 @@
 #include "forward/recorder.hpp"
 #include "forward/trace.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -90,6 +92,28 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     return record;
 }
 
+// How far from equilibrium a run was, and how fast its cracks ran.
+std::string motion_note(const Record& record, const ExplicitSolver& solver) {
+    // Kinetic energy up to 5 to 10 % of the strain energy is what is called quasi-static (Abaqus Analysis User's Guide, 6.3.3).
+    constexpr double quasistatic_ratio = 0.05;
+    double kinetic = 0.0, strain = 0.0;
+    for (const Instant& row : record.series) {
+        if (row.fracture_energy > 0.0) break;
+        kinetic += row.kinetic_energy;
+        strain += row.strain_energy;
+    }
+    const Instant& last = record.series.back();
+    std::string note;
+    if (strain > 0.0) {
+        const double ratio = kinetic / strain;
+        note += fmt::format("; kinetic over strain energy {:.2g} on average{}{}", ratio, last.fracture_energy > 0.0 ? " before a crack grew" : "",
+                            ratio > quasistatic_ratio ? fmt::format(", not quasi-static (up to {})", quasistatic_ratio) : "");
+        if (last.strain_energy > 0.0) note += fmt::format(", {:.2g} at the end", last.kinetic_energy / last.strain_energy);
+    }
+    if (solver.fastest_crack() > 0.0) note += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());
+    return note;
+}
+
 Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
                     const SimulateOptions& options) {
     ExplicitSolver solver(scene, plan, materials, body);
@@ -118,7 +142,9 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         solver.step();
         recorder.add_step();
     }
-    return recorder.take();
+    Record record = recorder.take();
+    record.message += motion_note(record, solver);
+    return record;
 }
 
 Scene with_cell(Scene scene, double cell) {

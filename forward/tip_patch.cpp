@@ -21,7 +21,7 @@ constexpr double least_cells_in_reach = 10.0;
 
 // The held outline takes up what a longer crack would pass on to the rest of the specimen: in one wood, where the rate should stay as it
 // is, it falls by this much times the way over the half width (`VerificationTipPatch.OneWood`).
-constexpr double fall_in_one_wood = 0.0;
+constexpr double fall_in_one_wood = 1.62;
 
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
 constexpr double least_stiffness = 1e-9;

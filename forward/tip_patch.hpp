@@ -22,8 +22,8 @@ class TipPatch {
     /// Leaves `body` as it was. `slack` [m] is how far the tip may go on before this patch is no longer good.
     TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end, double advance, double slack);
 
-    /// Mean energy release rate over the next cell over that over the next `advance`, with the tip `gone` [m] beyond where it was when the patch was
-    /// made; 1 where there is no load.
+    /// Mean energy release rate over the next cell over that over the next `advance`, with the tip `gone` [m] beyond where it was when
+    /// the patch was made; 1 where there is no load.
     double local_share(double gone, const std::vector<Vec2>& displacement) const;
 
     /// What the compliances of the next pairs must be multiplied by for the potential to go linearly while the tip passes them; the
