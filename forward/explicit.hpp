@@ -26,7 +26,8 @@ struct EnergyBooks {
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
 /// displacements), lumped mass. As no point ever leaves its cell, mapping velocities to the points and back by the full mass
-/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps them.
+/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps
+/// them.
 class ExplicitSolver {
   public:
     ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
@@ -34,8 +35,8 @@ class ExplicitSolver {
     /// One time step.
     void step();
 
-    /// Lets each growing tip go on until it has taken up as much energy as the toughness asks for, but no faster than a Rayleigh wave
-    /// in the wood at the tip (Freund 1990). Before every step.
+    /// Lets each growing tip go on until it has taken up as much energy as the toughness asks for, but no faster than a Rayleigh
+    /// wave in the wood at the tip (Freund 1990). Before every step.
     void grow_cracks();
 
     TipLoad load_at(int crack, bool at_end) const;

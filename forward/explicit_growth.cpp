@@ -12,12 +12,12 @@ namespace {
 // A tip asks for its direction anew after this part of a cell.
 constexpr double leg_in_cells = 0.25;
 
-// The opening that gives a direction is a mean over the time in which a Rayleigh wave goes so many cells, the reach of J's domain:
-// pairs swing as they are freed, and the way of a crack must not hang on in which part of a swing it was asked for.
+// The opening that gives a direction is a mean over the time in which a Rayleigh wave goes so many cells, the reach of J's
+// domain: pairs swing as they are freed, and the way of a crack must not hang on in which part of a swing it was asked for.
 constexpr double cells_in_mean = 4.0;
 
-// How far a tip may be ahead of a Rayleigh wave: a pair that is held back takes up more than the toughness asks for, which the energy
-// books miss (ring specimen at 10 m/s: 0.3 % of the work with one cell, 1.6 % with a half).
+// How far a tip may be ahead of a Rayleigh wave: a pair that is held back takes up more than the toughness asks for, which the
+// energy books miss (ring specimen at 10 m/s: 0.3 % of the work with one cell, 1.6 % with a half).
 constexpr double most_ahead_in_cells = 1.0;
 constexpr double cells_in_speed = 8.0;  // over which it is told
 
@@ -49,7 +49,8 @@ void ExplicitSolver::grow(int crack, bool at_end) {
 
     double way = 0.0;
     if (ties_.holds(cracks_, crack, at_end))
-        way = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed, displacement_, velocity_, plan_.time_step);
+        way = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed,
+                                 displacement_, velocity_, plan_.time_step);
     else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides
         way = std::min(state.allowed, leg_in_cells * cell);
     if (way < least_way_in_cells * cell) return;
@@ -73,7 +74,8 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
         ties_.take_in(cracks_, mass_, displacement_, false);
     } else {
-        const double softness = materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
+        const double softness =
+            materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
 }
@@ -83,7 +85,8 @@ TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
     const double cell = body_.layout.cell.maxCoeff();
     Tip& state = tips_[2 * crack + at_end];
     if (!state.patch || state.since_patch > cell || state.patch_direction.dot(tip.direction) < most_turn_cosine) {
-        state.patch = std::make_unique<TipPatch>(body_, cracks_, boundary_, crack, at_end, std::max(cell, scene_.cracks[crack].advance), cell);
+        const double advance = std::max(cell, scene_.cracks[crack].advance);
+        state.patch = std::make_unique<TipPatch>(body_, cracks_, boundary_, crack, at_end, advance, cell);
         state.since_patch = 0.0;
         state.patch_direction = tip.direction;
     }

@@ -106,8 +106,9 @@ std::string motion_note(const Record& record, const ExplicitSolver& solver) {
     std::string note;
     if (strain > 0.0) {
         const double ratio = kinetic / strain;
-        note += fmt::format("; kinetic over strain energy {:.2g} on average{}{}", ratio, last.fracture_energy > 0.0 ? " before a crack grew" : "",
-                            ratio > quasistatic_ratio ? fmt::format(", not quasi-static (up to {})", quasistatic_ratio) : "");
+        note += fmt::format("; kinetic over strain energy {:.2g} on average", ratio);
+        if (last.fracture_energy > 0.0) note += " before a crack grew";
+        if (ratio > quasistatic_ratio) note += fmt::format(", not quasi-static (up to {})", quasistatic_ratio);
         if (last.strain_energy > 0.0) note += fmt::format(", {:.2g} at the end", last.kinetic_energy / last.strain_energy);
     }
     if (solver.fastest_crack() > 0.0) note += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());

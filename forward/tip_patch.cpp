@@ -19,8 +19,8 @@ using Sparse = Eigen::SparseMatrix<double>;
 constexpr double advances_in_reach = 8.0;
 constexpr double least_cells_in_reach = 10.0;
 
-// The held outline takes up what a longer crack would pass on to the rest of the specimen: in one wood, where the rate should stay as it
-// is, it falls by this much times the way over the half width (`VerificationTipPatch.OneWood`).
+// The held outline takes up what a longer crack would pass on to the rest of the specimen: in one wood, where the rate should
+// stay as it is, it falls by this much times the way over the half width (`VerificationTipPatch.OneWood`).
 constexpr double fall_in_one_wood = 1.62;
 
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
@@ -38,14 +38,15 @@ Eigen::Matrix<double, 3, 8> strains(const CellWeights& w) {
 
 } // namespace
 
-TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end, double advance,
-                   double slack) {
+TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end,
+                   double advance, double slack) {
     const CrackTip tip = cracks.lines[crack].tip(at_end);
     cell_ = tip.direction.cwiseProduct(body.layout.cell).lpNorm<1>();
     // The crack as it will be, as far as that is wood.
     const double h = body.layout.cell.maxCoeff();
     double way = advance + slack;
-    if (const auto out = exit_distance(tip.position, tip.direction, {Vec2::Zero(), body.layout.size()})) way = std::min(way, *out - 1e-3 * h);
+    if (const auto out = exit_distance(tip.position, tip.direction, {Vec2::Zero(), body.layout.size()}))
+        way = std::min(way, *out - 1e-3 * h);
     advance_ = std::min(advance, way - slack);
     if (advance_ <= 0.0) return;  // no more than the next cell is left
     const auto points_before = body.points.node;
@@ -202,9 +203,11 @@ double TipPatch::local_share(double gone, const std::vector<Vec2>& displacement)
     const Eigen::VectorXd jumps = free_jumps(displacement);
     const double softness = softness_for(gone, jumps);
     const double here = potential(gone, softness, jumps);
-    const double local = (here - potential(gone + cell_, softness, jumps)) / cell_ / (1.0 - 0.5 * fall_in_one_wood * cell_ / reach_);
-    const double mean = (here - potential(gone + advance_, softness, jumps)) / advance_ / (1.0 - 0.5 * fall_in_one_wood * advance_ / reach_);
-    return mean > 0.0 ? local / mean : 1.0;
+    const auto rate_over = [&](double way) {
+        return (here - potential(gone + way, softness, jumps)) / (way * (1.0 - 0.5 * fall_in_one_wood * way / reach_));
+    };
+    const double mean = rate_over(advance_);
+    return mean > 0.0 ? rate_over(cell_) / mean : 1.0;
 }
 
 } // namespace crampfit

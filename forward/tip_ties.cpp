@@ -7,7 +7,9 @@ namespace crampfit {
 
 namespace {
 
-Vec2 jump_of(const FieldPair& pair, const std::vector<Vec2>& displacement) { return displacement[pair.left] - displacement[pair.right]; }
+Vec2 jump_of(const FieldPair& pair, const std::vector<Vec2>& displacement) {
+    return displacement[pair.left] - displacement[pair.right];
+}
 
 } // namespace
 
@@ -21,8 +23,8 @@ double TipTies::stiffness(const Tie& tie, double f) const { return (1.0 - f) / (
 // The way on which a tip frees a pair [m], as `CrackFields` has it.
 double TipTies::width(const CrackTip& tip) const { return tip.direction.cwiseProduct(cell_).lpNorm<1>(); }
 
-void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest,
-                      double softness) {
+void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement,
+                      bool at_rest, double softness) {
     const std::size_t known = ties_.size();
     ties_.resize(cracks.pairs.size());
     live_.clear();

@@ -8,13 +8,14 @@ namespace crampfit {
 
 /// What holds the pairs of fields together that a crack tip is passing, in motion; and by that the energy that the tip takes up.
 ///
-/// With c the compliance of a free pair and f the share of its way past the pair that the tip has gone, a tie of stiffness
-/// (1 - f) / (f c) lets the specimen give up its energy linearly in f (CrackFields). An explicit time step cannot afford it at small f.
-/// So a tie here has a slack compliance s c in series, stretched from the start by the force F0 that held the node together before:
+/// With c the compliance of a free pair and f the share of its way past the pair that the tip has gone, a tie of stiffness (1 -
+/// f) / (f c) lets the specimen give up its energy linearly in f (CrackFields). An explicit time step cannot afford it at small
+/// f. So a tie here has a slack compliance s c in series, stretched from the start by the force F0 that held the node together
+/// before:
 ///     force = (1 - f) / ((f + s) c) (jump + s c F0),
-/// F0 at f = 0 and without jump. Under a load that stays, with jump = c (F0 - force), the force is F0 (1 - f), as without slack: the pair
-/// opens as a linearly softening cohesive crack that is rigid before (Camacho and Ortiz 1996; continuous in time as Papoulia, Sam and
-/// Vavasis 2003 ask). Its energy, with what the slack held at the start taken off,
+/// F0 at f = 0 and without jump. Under a load that stays, with jump = c (F0 - force), the force is F0 (1 - f), as without slack:
+/// the pair opens as a linearly softening cohesive crack that is rigid before (Camacho and Ortiz 1996; continuous in time as
+/// Papoulia, Sam and Vavasis 2003 ask). Its energy, with what the slack held at the start taken off,
 ///     W = (1 - f) / 2 [ |jump + s c F0|^2 / ((f + s) c) - s c F0^2 ],
 /// is the only thing in a running specimen that depends on where the tip is, so that - dW/da is the energy release rate, exactly.
 class TipTies {
@@ -23,10 +24,10 @@ class TipTies {
     TipTies(const Vec2& cell, double thickness, double most_frequency_squared)
         : cell_(cell), thickness_(thickness), most_frequency_squared_(most_frequency_squared) {}
 
-    /// After a tip has moved or masses have changed. Pairs that are new are held by what holds them now, from the next `pull` on; those
-    /// of the start of a run (`at_rest`) by nothing yet. `softness` is that of TipPatch, for new pairs.
-    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest,
-                 double softness = 1.0);
+    /// After a tip has moved or masses have changed. Pairs that are new are held by what holds them now, from the next `pull` on;
+    /// those of the start of a run (`at_rest`) by nothing yet. `softness` is that of TipPatch, for new pairs.
+    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement,
+                 bool at_rest, double softness = 1.0);
 
     /// Lets the ties that are new hold their pairs together under these forces of the fields [N].
     void settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force);
@@ -36,9 +37,9 @@ class TipTies {
 
     double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const;  // [J]
 
-    /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for. Over a step of central
-    /// differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch of this step times that of the
-    /// one before: a step `dt` [s] back, by the velocities.
+    /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for. Over a step
+    /// of central differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch of this step
+    /// times that of the one before: a step `dt` [s] back, by the velocities.
     double balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
                         const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const;
 

@@ -48,7 +48,7 @@ TEST(VerificationTipPatch, OneWood) {
             const Boundary boundary(run.scene, run.body, cracks);
             const TipPatch patch(run.body, cracks, boundary, 0, true, advance, h);
             const double share = patch.local_share(0.0, u);
-            std::printf("advance of %.0f cells, tip %.2f of a cell along: rate over the next cell %+.2f %% off the mean, pairs %.3f as soft\n",
+            std::printf("advance of %.0f cells, tip %.2f of a cell along: next cell %+.2f %% off the mean, pairs %.3f as soft\n",
                         advance / h, place, 100 * (share - 1), patch.softness(0.0, u));
             EXPECT_NEAR(share, 1.0, 0.005);
         }
@@ -56,7 +56,8 @@ TEST(VerificationTipPatch, OneWood) {
 }
 
 TEST(VerificationStepLoadedCrack, Freund) {
-    // REFERENCES: a plane step of tension, from the side above, reaches a long crack at tc, K = 2 sigma / (1 - nu) sqrt(cd (t - tc) (1 - 2 nu) / pi) (Freund 1990).
+    // REFERENCES: a plane step of tension, from the side above, reaches a long crack at tc, K = 2 sigma / (1 - nu) sqrt(cd (t -
+    // tc) (1 - 2 nu) / pi) (Freund 1990).
     const double E = 210e9, nu = 0.3, density = 8000, H = 2.0, stress = 1e6;
     const double speed = std::sqrt(E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / density);
     const double arrival = H / speed;
@@ -97,8 +98,9 @@ TEST(VerificationMovingCrack, EnergyBooksClose) {
             scene.cracks[0].advance = advance;
             scene.cracks[0].direction = direction;
             const Record record = simulate(scene);
-            std::printf("advance %.1f mm: %s; work %.4f J, fracture %.4f J, books off by %.2f %%\n", 1e3 * advance, record.message.c_str(),
-                        record.series.back().external_work, record.series.back().fracture_energy, 100 * record.worst_energy_imbalance);
+            const Instant& end = record.series.back();
+            std::printf("advance %.1f mm: %s; work %.4f J, fracture %.4f J, books off by %.2f %%\n", 1e3 * advance,
+                        record.message.c_str(), end.external_work, end.fracture_energy, 100 * record.worst_energy_imbalance);
             EXPECT_EQ(record.status, RunStatus::split);
             EXPECT_LT(record.worst_energy_imbalance, 0.01);
         }
@@ -122,7 +124,8 @@ TEST(VerificationMovingCrack, TougherWoodTakesLonger) {
         for (auto& [name, wood] : scene.materials) wood.toughness = toughness;
         const Record record = simulate(scene);
         const double first_now = time_at(record, 2.55e-3), crossing_now = record.series.back().time;
-        std::printf("toughness %.0f J/m^2: first growth at %.3f us, across at %.3f us\n", toughness, 1e6 * first_now, 1e6 * crossing_now);
+        std::printf("toughness %.0f J/m^2: first growth at %.3f us, across at %.3f us\n", toughness, 1e6 * first_now,
+                    1e6 * crossing_now);
         EXPECT_GT(first_now, first - step);
         EXPECT_GT(crossing_now, crossing - 1.001 * step);
         if (first > 0.0) {
@@ -144,7 +147,9 @@ TEST(VerificationMovingCrack, StaysBelowTheRayleighWave) {
     double fastest = 0.0;
     for (std::size_t i = 0, j = 0; i < record.series.size(); ++i)
         for (; j < record.series.size() && record.series[j].crack_length < record.series[i].crack_length + 1.6e-3; ++j)
-            if (j > i) fastest = std::max(fastest, (record.series[j].crack_length - record.series[i].crack_length) / (record.series[j].time - record.series[i].time));
+            if (j > i)
+                fastest = std::max(fastest, (record.series[j].crack_length - record.series[i].crack_length) /
+                                                (record.series[j].time - record.series[i].time));
     std::printf("crack at up to %.0f m/s over 1.6 mm, Rayleigh wave %.0f m/s; %s\n", fastest, rayleigh, record.message.c_str());
     EXPECT_GT(fastest, 0.5 * rayleigh);
     EXPECT_LT(fastest, 8.0 / 7.0 * rayleigh);  // one cell ahead, in eight
