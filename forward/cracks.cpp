@@ -53,6 +53,14 @@ double length_inside(const std::vector<Vec2>& points, const Box& box) {
 
 } // namespace
 
+double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) {
+    // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
+    // and would free the nodes far off an oblique crack too early.
+    const Vec2 cell_along = tip.direction.cwiseProduct(layout.cell);
+    const double ahead = (node - tip.position).dot(tip.direction) + tip_lag(layout) * cell_along.norm();
+    return 0.5 - ahead / cell_along.lpNorm<1>();
+}
+
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along) {
     const LocalWood wood = materials.average(centre, half);
     if (!materials.orthotropic() || wood.filled == 0.0) return wood.plane_modulus();
@@ -229,13 +237,9 @@ double CrackFields::freed(int crack, int node) const {
             if ((x - tip->position).dot(tip->direction) > reach.norm()) return 0.0;
             continue;
         }
-        // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
-        // and would free the nodes far off an oblique crack too early.
-        const Vec2 cell_along = tip->direction.cwiseProduct(body_->layout.cell);
-        const double ahead = (x - tip->position).dot(tip->direction) + tip_lag(body_->layout) * cell_along.norm();
-        least = std::min(least, 0.5 - ahead / cell_along.lpNorm<1>());
+        least = std::min(least, share_freed(x, *tip, body_->layout));
     }
-    return std::max(0.0, least);
+    return least;
 }
 
 void CrackFields::sort_points(int crack, const Box& window) {
@@ -284,17 +288,31 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         const Vec2 on_the_way = x + tip_lag(body_->layout) * lines[k].tip(at_end).direction.cwiseProduct(body_->layout.cell);
         const Vec2 along = lines[k].tip(at_end).direction;
         const double plane_modulus = opening_modulus(*materials_, on_the_way, 0.5 * body_->layout.cell, along);
-        const bool own_is_left = is_left(k, x) == !(mask >> k & 1u);
-        pairs.push_back({own_is_left ? own : other, own_is_left ? other : own, node, k,
-                         left_of(lines[k].direction_near(true, x)), on_the_way, along, plane_modulus, 0.0});
+        const int with_node = mask >> k & 1u ? other : own;
+        const int beyond = mask >> k & 1u ? own : other;
+        const bool node_is_left = is_left(k, x);
+        pairs.push_back({node_is_left ? with_node : beyond, node_is_left ? beyond : with_node, with_node, node, k,
+                         left_of(lines[k].direction_near(true, x)), on_the_way, along, plane_modulus,
+                         pair_compliance / (plane_modulus * body_->layout.thickness), 1.0, 0.0});
+    }
+}
+
+// A crack that turns just before a node may pass on its other side.
+void CrackFields::renew_sides(int crack) {
+    for (FieldPair& pair : pairs) {
+        if (pair.crack != crack || pair.freed >= 1.0) continue;
+        const bool node_is_left = is_left(crack, body_->layout.node_position(pair.node));
+        if ((pair.left == pair.with_node) != node_is_left) std::swap(pair.left, pair.right);
     }
 }
 
 void CrackFields::renew_ties(int crack) {
+    constexpr double smallest = 1e-6;
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
-        const double f = std::max(least_freed_, freed(crack, pair.node));
-        pair.tie = (1.0 - f) / f * pair.plane_modulus * body_->layout.thickness / pair_compliance;
+        pair.freed = freed(crack, pair.node);
+        const double f = std::max({least_freed_, pair.freed, smallest});
+        pair.tie = (1.0 - f) / (f * pair.compliance);
     }
 }
 
@@ -315,8 +333,32 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
 
     new_fields_.clear();
     sort_points(crack, window(from, to));
+    renew_sides(crack);
     renew_ties(crack);
     return new_fields_;
+}
+
+bool CrackFields::slide(int crack, bool at_end, double distance) {
+    CrackLine& line = lines[crack];
+    CrackTip& tip = line.tip(at_end);
+    const Vec2 from = tip.position;
+    const Vec2 to = from + distance * tip.direction;
+    if (!is_inside(to)) return false;
+    bool frees_further = false;
+    body_->for_cells_in(window(from, to), [&](int c) {
+        for (const int node : body_->layout.cell_nodes(c)) {
+            tip.position = from;
+            const bool was_free = freed(crack, node) >= least_freed_;
+            tip.position = to;
+            frees_further |= !was_free && freed(crack, node) >= least_freed_;
+        }
+    });
+    tip.position = frees_further ? from : to;
+    if (frees_further) return false;
+    (at_end ? line.points.back() : line.points.front()) = to;
+    line.length += distance;
+    renew_ties(crack);
+    return true;
 }
 
 Box CrackFields::window(const Vec2& from, const Vec2& to) const {

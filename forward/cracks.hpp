@@ -38,14 +38,20 @@ struct CrackLine {
 struct FieldPair {
     int left;         // field on the left of the crack, seen from start to end
     int right;        // field on the right
+    int with_node;    // that of the two whose wood lies on the node's side of the crack
     int node;         // where they are
     int crack;
     Vec2 normal;      // unit, from right to left
     Vec2 freed_at;         // where the tip is when it frees the pair
     Vec2 along;            // unit, the way that it goes
     double plane_modulus;  // E' of the wood there [Pa]
-    double tie;       // stiffness that still holds the pair together [N/m]; 0 once the crack has cut the node's whole support
+    double compliance;     // of the pair when it is free [m/N]
+    double freed;          // share of the way past the pair that the tip has gone; 1: the crack has cut the node's whole support
+    double tie;       // stiffness that still holds the pair together [N/m]; 0 once the pair is free
 };
+
+/// Share of its way past a node, over the width of a cell, that a tip has gone: below 0 before, above 1 after.
+double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout);
 
 /// E' of the wood of a small area as a crack that runs along a direction sees it, G = K_I^2 / E' [Pa].
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along);
@@ -59,8 +65,8 @@ double opening_modulus(const MaterialMap& materials, const Vec2& centre, const V
 /// tip has gone, the energy released is 1/2 F^2 c / (1 + s c), which is f times that of the free pair when s = (1 - f) / (f c).
 class CrackFields {
   public:
-    /// A pair appears once the tip has gone `least_freed` of that way: with less, the
-    /// tie would be stiffer still, which shortens an explicit time step for nothing.
+    /// A pair appears once the tip has gone `least_freed` of that way, or just before for a negative number. `tie` never
+    /// becomes stiffer than it is at that share, if that is above 0.
     CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed);
 
     struct NewField {
@@ -77,6 +83,10 @@ class CrackFields {
     /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Where it meets another crack on the
     /// way, or comes so near that the grid does not tell, it ends there. Returns the fields that this adds.
     std::vector<NewField> grow(int crack, bool at_end, const Vec2& to);
+
+    /// The same where the tip goes straight on and frees no further node, so that no point changes sides. False, and nothing is
+    /// done, where it does not.
+    bool slide(int crack, bool at_end, double distance);
 
     /// Where points change sides when a tip goes from one place to another.
     Box window(const Vec2& from, const Vec2& to) const;
@@ -98,6 +108,7 @@ class CrackFields {
     void sort_points(int crack, const Box& window);
     int field(int node, unsigned mask, int crack);
     void add_pairs(int node, unsigned mask);
+    void renew_sides(int crack);
     void renew_ties(int crack);
 
     const Scene* scene_;

@@ -370,6 +370,10 @@ bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const
 
 } // namespace
 
+Vec2 opening_behind(const CrackFields& cracks, int crack, bool at_end, double cell, const std::vector<Vec2>& displacement) {
+    return cracks.opening(crack, cracks.lines[crack].behind(at_end, 1.5 * cell), displacement);
+}
+
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options) {
     const CrackLine& line = cracks.lines[crack];
@@ -384,7 +388,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
     load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, body.layout.thickness);
-    load.opening = cracks.opening(crack, line.behind(at_end, 1.5 * h), state.displacement);
+    load.opening = opening_behind(cracks, crack, at_end, h, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, line, at_end, field, anywhere, state, pieces, options.rotates);

@@ -23,6 +23,9 @@ struct TipLoad {
     double toughness = 0;     // of the wood at the tip [J/m^2]
 };
 
+/// Displacement jump just behind a tip, the left face less the right [m].
+Vec2 opening_behind(const CrackFields& cracks, int crack, bool at_end, double cell, const std::vector<Vec2>& displacement);
+
 /// Radii of the virtual extension, in cells. It shrinks where other wood is near, so that little hangs on the gradient term,
 /// and keeps off other cracks.
 struct EnergyReleaseOptions {

@@ -1,7 +1,5 @@
 #include "forward/explicit.hpp"
 
-#include "forward/growth.hpp"
-
 #include "datasets/error.hpp"
 
 #include <fmt/format.h>
@@ -13,23 +11,24 @@ namespace crampfit {
 
 namespace {
 
-// Of a pair of fields at a crack tip (CrackFields): a stiffer tie than at this place would shorten the time step for nothing.
-constexpr double least_freed = 0.15;
+// A pair of fields at a crack tip comes up just before the tip frees it, so that some tie always holds the tip (CrackFields).
+constexpr double least_freed = -0.02;
 
 } // namespace
 
 ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates), team_(threads), mapping_(scene.solver, body) {
+      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates), team_(threads),
+      ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());
     velocity_.assign(fields, Vec2::Zero());
     acceleration_.assign(fields, Vec2::Zero());
     force_.assign(fields, Vec2::Zero());
     reaction_.assign(scene.edges.size() + scene.bodies.size(), Vec2::Zero());
-    tip_loads_.resize(2 * cracks_.lines.size());
-    last_growth_.assign(2 * cracks_.lines.size(), 0.0);
+    tips_.resize(2 * cracks_.lines.size());
     mass_ = field_masses(body, cracks_.fields());
+    ties_.take_in(cracks_, mass_, displacement_, true);
     for (const Boundary::Held& h : boundary_.held) {
         velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
         books_.work += 0.5 * mass_[h.field] * velocity_[h.field][h.axis] * velocity_[h.field][h.axis];
@@ -57,7 +56,8 @@ void ExplicitSolver::step() {
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
     internal_force_.add(displacement_, force_, team_);
     surface_forces();
-    tie_forces();
+    ties_.settle(cracks_, mass_, force_);
+    ties_.pull(cracks_, displacement_, force_);
     advance_velocities();
     close_crack_faces(true);
     prescribe_velocities();
@@ -85,21 +85,6 @@ void ExplicitSolver::surface_forces() {
         books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver, time_, time_ + plan_.time_step));
     }
     if (part_contact_) part_contact_->push(displacement_, force_);
-}
-
-double ExplicitSolver::tie_stiffness(const FieldPair& pair) const {
-    const double left = mass_[pair.left];
-    const double right = mass_[pair.right];
-    return std::min(shared_tie(pair, mass_), plan_.added_frequency_squared * left * right / (left + right));
-}
-
-void ExplicitSolver::tie_forces() {
-    for (const FieldPair& pair : cracks_.pairs) {
-        if (pair.tie == 0.0 || mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) continue;
-        const Vec2 pull = tie_stiffness(pair) * (displacement_[pair.left] - displacement_[pair.right]);
-        force_[pair.left] -= pull;
-        force_[pair.right] += pull;
-    }
 }
 
 void ExplicitSolver::advance_velocities() {
@@ -199,10 +184,7 @@ EnergyBooks ExplicitSolver::energies() const {
     const double since = time_ > 0.0 ? (0.5 + lag()) * plan_.time_step : 0.0;
     std::vector<Vec2> there = displacement_;
     for (std::size_t n = 0; n < there.size(); ++n) there[n] -= since * velocity_[n];
-    books.strain = internal_force_.energy(there);
-    for (const FieldPair& pair : cracks_.pairs)
-        if (pair.tie > 0.0 && mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0)
-            books.strain += 0.5 * tie_stiffness(pair) * (there[pair.left] - there[pair.right]).squaredNorm();
+    books.strain = internal_force_.energy(there) + ties_.energy(cracks_, there);
     books.kinetic = kinetic_energy();
     for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
     for (const SlidingBody& body : sliding_) books.damped += body.dissipated();
@@ -229,30 +211,6 @@ double ExplicitSolver::kinetic_energy() const {
 
 bool ExplicitSolver::is_finite() const {
     return std::all_of(displacement_.begin(), displacement_.end(), [](const Vec2& u) { return u.allFinite(); });
-}
-
-void ExplicitSolver::grow_cracks() {
-    constexpr double increment_in_cells = 0.25;
-    const double increment = increment_in_cells * body_.layout.cell.minCoeff();
-    for (int k = 0; k < static_cast<int>(cracks_.lines.size()); ++k) {
-        for (const bool at_end : {false, true}) {
-            const CrackTip tip = cracks_.lines[k].tip(at_end);
-            if (!tip.grows || !tip.inside) continue;
-            TipLoad& load = tip_loads_[2 * k + at_end];
-            load = load_at(k, at_end);
-            if (load.G < load.toughness) continue;
-            // A crack cannot outrun the Rayleigh wave (Freund 1990).
-            const LocalWood wood = materials_.at(tip.position);
-            const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
-            double& last = last_growth_[2 * k + at_end];
-            if (time_ - last < increment / rayleigh) continue;
-            last = time_;
-
-            const Vec2 direction = growth_direction(scene_.cracks[k].direction, tip, load, materials_, increment);
-            books_.fracture += load.toughness * increment * body_.layout.thickness;
-            adopt(cracks_.grow(k, at_end, tip.position + increment * direction));
-        }
-    }
 }
 
 } // namespace crampfit

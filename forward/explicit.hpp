@@ -6,9 +6,13 @@
 #include "forward/internal_force.hpp"
 #include "forward/part_contact.hpp"
 #include "forward/plan.hpp"
+#include "forward/tip_patch.hpp"
+#include "forward/tip_ties.hpp"
 #include "forward/velocity_mapping.hpp"
 
 #include <functional>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -40,16 +44,17 @@ class ExplicitSolver {
     /// One time step.
     void step();
 
-    /// Lets each growing tip advance where the energy release rate has reached the toughness.
+    /// Lets each growing tip go on until it has taken up as much energy as the toughness asks for, but no faster than a Rayleigh
+    /// wave in the wood at the tip (Freund 1990). Before every step.
     void grow_cracks();
 
     TipLoad load_at(int crack, bool at_end) const;
     EnergyBooks energies() const;
+    double fastest_crack() const { return fastest_crack_; }  // of growing tips, over eight cells [m/s]
     double time() const { return time_; }
     const CrackFields& cracks() const { return cracks_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
     const std::vector<Vec2>& velocities() const { return velocity_; }
-    const std::vector<TipLoad>& tip_loads() const { return tip_loads_; }  // latest, two a crack: start, end
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
     const std::vector<Vec2>& reactions() const { return reaction_; }
@@ -59,23 +64,36 @@ class ExplicitSolver {
     bool has_left(int crack, bool at_end) const { return !cracks_.lines[crack].tip(at_end).inside; }
 
   private:
+    struct Tip {
+        double allowed = std::numeric_limits<double>::infinity();      // how far a Rayleigh wave leaves it to go at once [m]
+        double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
+        double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
+        Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
+        Vec2 intensities = Vec2::Zero();                               // K_I, K_II, a mean over its last turns [Pa sqrt(m)]
+        std::unique_ptr<TipPatch> patch;                               // as of some time ago
+        double since_patch = 0;                                        // how far it has gone since that was made [m]
+        Vec2 patch_direction = Vec2::Zero();                           // then
+        double noted_at = 0;                                           // [s]
+    };
     void place_bodies();
     void start_parts();
     void list_held();
     double lag() const;
     double kinetic_energy() const;
-    void adopt(const std::vector<CrackFields::NewField>& fields);
+    void adopt(const std::vector<CrackFields::NewField>& fields, double softness);
     Vec2 mean_velocity_of(int driver, double from, double to) const;
     Vec2 velocity_at_end_of_step(int driver) const;
 
     void surface_forces();
-    void tie_forces();
     void advance_velocities();
     void carry_velocities();
     void close_crack_faces(bool with_force);
     void prescribe_velocities();
     void advance_displacements(double share);
-    double tie_stiffness(const FieldPair& pair) const;
+    void grow(int crack, bool at_end);
+    TipPatch& patch_of(int crack, bool at_end);
+    double toughness_to_overcome(int crack, bool at_end, double here);
+    void note_speed(Tip& state, double way);
 
     const Scene& scene_;
     const Plan& plan_;
@@ -85,6 +103,7 @@ class ExplicitSolver {
     Boundary boundary_;
     InternalForce internal_force_;
     mutable Team team_;
+    TipTies ties_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
     std::optional<PartContact> part_contact_;
@@ -101,9 +120,9 @@ class ExplicitSolver {
 
     std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
     std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
-    std::vector<TipLoad> tip_loads_;
-    std::vector<double> last_growth_; // [two a crack] [s]
     std::vector<double> damped_;      // [pieces of the fields] in this step [J]
+    std::vector<Tip> tips_;           // two a crack: start, end
+    double fastest_crack_ = 0;        // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
 };

@@ -80,7 +80,7 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     books_.work = at_start.strain + at_start.kinetic;
 }
 
-void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
+void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {
     for (const auto& [added, from] : fields) {
         displacement_.push_back(displacement_[from]);
         velocity_.push_back(velocity_[from]);
@@ -92,6 +92,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields) {
     list_held();
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
+    ties_.take_in(cracks_, mass_, displacement_, false, softness);
 }
 
 } // namespace crampfit

@@ -107,7 +107,7 @@ void Recorder::save_row() {
         const bool end = k == crack_ ? at_end_ : scene_.cracks[k].grows != Growth::start;
         const CrackLine& line = solver_.cracks().lines[k];
         TipLoad load;
-        if (line.tip(end).inside) load = line.tip(end).grows ? solver_.tip_loads()[2 * k + end] : solver_.load_at(k, end);
+        if (line.tip(end).inside) load = solver_.load_at(k, end);
         if (k == crack_) {
             row.G = load.G;
             row.K_I = load.K_I;

@@ -16,8 +16,6 @@ namespace crampfit {
 
 namespace {
 
-// How often cracks are looked at: the tip then moves by a quarter of a cell at most this often.
-constexpr int steps_between_looks = 2;
 constexpr int steps_between_reports = 64;
 
 // Fewer points than this, a step of about 30 microseconds, do not pay for another thread.
@@ -120,7 +118,6 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     ExplicitSolver solver(scene, plan, materials, body, std::min(options.threads, 1 + body.points.count() / points_a_thread));
     Recorder recorder(scene, plan, body, solver);
     for (long step = 0;; ++step) {
-        if (plan.grows && step % steps_between_looks == 0) solver.grow_cracks();
         recorder.look();
         if (!recorder.is_finite()) {
             recorder.finish(RunStatus::unstable, "a displacement became infinite");
@@ -140,10 +137,13 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         }
         if (options.progress && step % steps_between_reports == 0)
             options.progress({recorder.fraction(), solver.time(), recorder.now().crack_length, step});
+        if (plan.grows) solver.grow_cracks();
         solver.step();
         recorder.add_step();
     }
-    return recorder.take();
+    Record record = recorder.take();
+    if (solver.fastest_crack() > 0.0) record.message += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());
+    return record;
 }
 
 Scene with_cell(Scene scene, double cell) {

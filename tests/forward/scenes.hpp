@@ -60,6 +60,12 @@ inline Scene at_equilibrium(Scene scene) {
     return scene;
 }
 
+/// The scene in motion, whatever the load's speed.
+inline Scene at_motion(Scene scene) {
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    return scene;
+}
+
 /// The ring specimen of the finite-element reference: 10 x 10 mm, pulled by 0.1 mm, edge crack of length a from the right. The
 /// latewood is made so heavy that both woods have the same wave speed: equilibrium does not feel it, and is reached sooner.
 inline Scene ring_specimen(double crack_length, double cell, bool rings = true) {

@@ -1,0 +1,181 @@
+// Cracks in motion: what the ties at a tip take up, where the tip stops, how fast it goes, and that no energy is lost on the way.
+#include "forward/tip_patch.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace crampfit::test {
+namespace {
+
+// Displacement around the tip of a crack that comes from +x, for K_I = 1 in plane strain (Williams 1957).
+Vec2 opening_field(const Vec2& arm, bool above) {
+    const double shear = 40e6 / (2 * 1.33), kappa = 3 - 4 * 0.33;
+    const Vec2 ahead(-arm.x(), arm.y());
+    double angle = std::atan2(ahead.y(), ahead.x());
+    if (std::abs(ahead.y()) < 1e-12 && ahead.x() < 0) angle = above ? std::numbers::pi : -std::numbers::pi;
+    const double s = std::sin(angle / 2), c = std::cos(angle / 2);
+    const double scale = std::sqrt(arm.norm() / (2 * std::numbers::pi)) / (2 * shear);
+    return {-scale * c * (kappa - 1 + 2 * s * s), scale * s * (kappa + 1 - 2 * c * c)};
+}
+
+TEST(VerificationTipPatch, OneWood) {
+    // In one wood the rate of a long crack does not change over an advance that is short against the crack: Irwin (1957).
+    const double h = 0.1e-3;
+    for (const double advance : {2 * h, 4 * h}) {
+        for (const double place : {0.0, 0.25, 0.5, 0.75}) {
+            Scene scene = block({12e-3, 12e-3}, h);
+            Crack crack;
+            const Vec2 tip(6e-3 + place * h, 6e-3);
+            crack.points = {Vec2(12e-3, 6e-3), tip};
+            crack.grows = Growth::end;
+            scene.cracks = {crack};
+            scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.measure = {"top", "top"};
+            scene.stop.time = 1e-3;
+            Trial run(at_motion(scene));
+            const CrackFields& cracks = run.solver.cracks();
+            std::vector<Vec2> u(cracks.fields());
+            for (int f = 0; f < cracks.fields(); ++f) {
+                const Vec2 x = run.body.layout.node_position(cracks.node_of_field[f]);
+                bool above = true;
+                for (const FieldPair& pair : cracks.pairs) above &= pair.left != f;  // seen toward -x the left is below
+                u[f] = opening_field(x - tip, above);
+            }
+            const Boundary boundary(run.scene, run.body, cracks);
+            const TipPatch patch(run.body, cracks, boundary, 0, true, advance, h);
+            const double share = patch.local_share(0.0, u);
+            std::printf("advance of %.0f cells, tip %.2f of a cell along: next cell %+.2f %% off the mean, pairs %.3f as soft\n",
+                        advance / h, place, 100 * (share - 1), patch.softness(0.0, u));
+            EXPECT_NEAR(share, 1.0, 0.005);
+        }
+    }
+}
+
+TEST(VerificationStepLoadedCrack, Freund) {
+    // REFERENCES: a plane step of tension, from the side above, reaches a long crack at tc, K = 2 sigma / (1 - nu) sqrt(cd (t -
+    // tc) (1 - 2 nu) / pi) (Freund 1990).
+    const double E = 210e9, nu = 0.3, density = 8000, H = 2.0, stress = 1e6;
+    const double speed = std::sqrt(E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / density);
+    const double arrival = H / speed;
+    Scene scene = block({10.0, 2 * H}, 0.05);
+    scene.materials["EW"] = {E, nu, density, 100.0};
+    scene.edges = {pulled("top", Side::top, {0.0, stress})};
+    Crack crack;
+    crack.points = {Vec2(0.0, H), Vec2(5.0, H)};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 3 * arrival;
+    Trial run(at_motion(scene));
+    for (const auto& [times, exact] : {std::pair{1.5, 0.721}, {2.0, 1.020}, {3.0, 1.442}}) {
+        run.until(times * arrival);
+        const double K = run.solver.load_at(0, true).K_I / (stress * std::sqrt(H));
+        std::printf("step-loaded crack at %.1f tc: K %.3f, exact %.3f, %+.1f %%\n", times, K, exact, 100 * (K / exact - 1));
+        EXPECT_NEAR(K, exact, 0.03 * exact);
+    }
+}
+
+// The ring specimen pulled apart at a constant speed, its crack growing.
+Scene growing_among_rings(double cell, double speed) {
+    Scene scene = at_motion(ring_specimen(2.5e-3, cell));
+    scene.materials["LW"].density = 750.0;
+    scene.edges = {moving("top", Side::top, {0.0, speed}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.cracks[0].grows = Growth::end;
+    scene.cracks[0].direction = GrowthDirection::straight;
+    scene.solver.damping = 0.0;
+    scene.stop = {};
+    scene.stop.displacement = 1e-3;
+    return scene;
+}
+
+TEST(VerificationMovingCrack, EnergyBooksClose) {
+    for (const double advance : {0.0, 0.4e-3}) {
+        for (const GrowthDirection direction : {GrowthDirection::straight, GrowthDirection::normal_to_opening}) {
+            Scene scene = growing_among_rings(0.2e-3, 10.0);
+            scene.cracks[0].advance = advance;
+            scene.cracks[0].direction = direction;
+            const Record record = simulate(scene);
+            const Instant& end = record.series.back();
+            std::printf("advance %.1f mm: %s; work %.4f J, fracture %.4f J, books off by %.2f %%\n", 1e3 * advance,
+                        record.message.c_str(), end.external_work, end.fracture_energy, 100 * record.worst_energy_imbalance);
+            EXPECT_EQ(record.status, RunStatus::split);
+            EXPECT_LT(record.worst_energy_imbalance, 0.01);
+        }
+    }
+}
+
+double time_at(const Record& record, double crack_length) {
+    const auto& rows = record.series;
+    for (std::size_t i = 1; i < rows.size(); ++i)
+        if (rows[i].crack_length >= crack_length)
+            return std::lerp(rows[i - 1].time, rows[i].time,
+                             (crack_length - rows[i - 1].crack_length) / (rows[i].crack_length - rows[i - 1].crack_length));
+    return std::nan("");
+}
+
+TEST(VerificationMovingCrack, TougherWoodTakesLonger) {
+    double first = 0.0, crossing = 0.0;
+    const double step = Trial(growing_among_rings(0.2e-3, 10.0)).plan.time_step;  // nothing is known better than that
+    for (double toughness = 90.0; toughness <= 110.0; toughness += 1.0) {
+        Scene scene = growing_among_rings(0.2e-3, 10.0);
+        for (auto& [name, wood] : scene.materials) wood.toughness = toughness;
+        const Record record = simulate(scene);
+        const double first_now = time_at(record, 2.55e-3), crossing_now = record.series.back().time;
+        std::printf("toughness %.0f J/m^2: first growth at %.3f us, across at %.3f us\n", toughness, 1e6 * first_now,
+                    1e6 * crossing_now);
+        EXPECT_GT(first_now, first - step);
+        EXPECT_GT(crossing_now, crossing - 1.001 * step);
+        if (first > 0.0) {
+            EXPECT_LT(first_now, 1.02 * first);
+            EXPECT_LT(crossing_now, 1.02 * crossing);
+        }
+        first = first_now;
+        crossing = crossing_now;
+    }
+}
+
+TEST(VerificationMovingCrack, StaysBelowTheRayleighWave) {
+    Scene scene = growing_among_rings(0.2e-3, 20.0);
+    scene.specimen.rings.reset();
+    scene.specimen.material = "EW";
+    const Record record = simulate(scene);
+    const double shear = std::sqrt(40e6 / (2 * 1.33) / 300.0);
+    const double rayleigh = shear * (0.862 + 1.14 * 0.33) / 1.33;  // Freund 1990, eq. 2.3.5
+    double fastest = 0.0;
+    for (std::size_t i = 0, j = 0; i < record.series.size(); ++i)
+        for (; j < record.series.size() && record.series[j].crack_length < record.series[i].crack_length + 1.6e-3; ++j)
+            if (j > i)
+                fastest = std::max(fastest, (record.series[j].crack_length - record.series[i].crack_length) /
+                                                (record.series[j].time - record.series[i].time));
+    std::printf("crack at up to %.0f m/s over 1.6 mm, Rayleigh wave %.0f m/s; %s\n", fastest, rayleigh, record.message.c_str());
+    EXPECT_GT(fastest, 0.5 * rayleigh);
+    EXPECT_LT(fastest, 8.0 / 7.0 * rayleigh);  // one cell ahead, in eight
+    EXPECT_NE(record.message.find("not quasi-static"), std::string::npos);
+    EXPECT_NE(record.message.find("crack at up to"), std::string::npos);
+}
+
+TEST(VerificationMovingCrack, BothTipsGrowAlike) {
+    for (const double advance : {0.0, 0.5e-3}) {
+        Scene scene = block({10e-3, 10e-3}, 0.25e-3);
+        scene.edges = {moving("top", Side::top, {0.0, 5.0}), moving("bottom", Side::bottom, {0.0, -5.0})};
+        Crack crack;
+        crack.points = {Vec2(3.5e-3, 5e-3), Vec2(6.5e-3, 5e-3)};
+        crack.grows = Growth::both;
+        crack.direction = GrowthDirection::straight;
+        crack.advance = advance;
+        scene.cracks = {crack};
+        scene.measure = {"top", "top"};
+        scene.stop.crack_length = 7e-3;
+        const Record record = simulate(at_motion(scene));
+        const Vec2 &start = record.paths[0].front(), &end = record.paths[0].back();
+        std::printf("advance %.2f mm: tips at %.4f and %.4f mm\n", 1e3 * advance, 1e3 * start.x(), 1e3 * end.x());
+        EXPECT_NEAR(start.x() + end.x(), 10e-3, 0.02e-3);
+        EXPECT_GE(end.x() - start.x(), 6.9e-3);
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::test
