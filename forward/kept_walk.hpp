@@ -24,7 +24,8 @@ class KeptWalk {
     /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
     bool reusable() const { return reusable_; }
 
-    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. One run at a
+    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. Probes
+    /// are solved for, and read as for the first scene's numbers. One run at a
     /// time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options);
 

@@ -2,6 +2,7 @@
 
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
+#include "forward/probes.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/recorder.hpp"
 #include "forward/trace.hpp"
@@ -45,33 +46,21 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
     return found == record.series.end() ? record.series.back() : *found;
 }
 
-// Frames at even times. A walk keeps no displacements: each frame is solved for anew with the cracks as they were then.
+// Frames at even times.
 void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
-    Discretisation body(scene, materials);
-    Equilibrium equilibrium(scene, plan, materials, body);
-    record.point_position = body.points.position;
-    record.point_latewood = body.points.latewood;
+    Revisit revisit(scene, plan, materials, walk);
+    record.point_position = revisit.body().points.position;
+    record.point_size = revisit.body().layout.point_size();
+    record.point_latewood = revisit.body().points.latewood;
     const TrackedTip tracked = tracked_tip(scene);
-    const auto grow = [&](const Vec2& to, int crack, bool at_end) {
-        const CrackTip& tip = equilibrium.cracks().lines[crack].tip(at_end);
-        if (tip.inside && (to - tip.position).norm() > 1e-6 * body.layout.cell.minCoeff()) equilibrium.grow(crack, at_end, to);
-    };
-    std::size_t station = 0;
     for (int k = 0; k < scene.output.frames; ++k) {
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
-        const double length = instant.crack_length * (1.0 + 1e-9);
-        while (tracked.crack >= 0 && !walk.station(station).left && walk.reach(station + 1, instant.time) &&
-               walk.station(station + 1).lengths[tracked.crack] <= length) {
-            const Station& from = walk.station(station++);
-            grow(walk.station(station).tips[from.crack][from.at_end], from.crack, from.at_end);
-        }
-        if (tracked.crack >= 0) grow(instant.tip, tracked.crack, tracked.at_end);
-        if (equilibrium.solve(instant.time) != Equilibrium::Outcome::solved) return;
-        record.frames.push_back(make_frame(scene, plan, body, equilibrium.displacements()));
+        if (!revisit.to(instant)) return;
+        record.frames.push_back(make_frame(scene, plan, revisit.body(), revisit.equilibrium().displacements()));
         Frame& frame = record.frames.back();
         frame.time = instant.time;
         frame.displacement = instant.displacement;
-        if (tracked.crack >= 0) frame.crack = equilibrium.cracks().lines[tracked.crack].points;
+        if (tracked.crack >= 0) frame.crack = revisit.equilibrium().cracks().lines[tracked.crack].points;
     }
 }
 
@@ -89,6 +78,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.steps = walk.equilibria();
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
+    read_probes(scene, plan, materials, walk, record);
     return record;
 }
 
