@@ -15,7 +15,7 @@ constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than w
 constexpr double too_green = 0.04; // green above red and blue
 constexpr double blank_black = 0.08, blank_white = 0.92;  // of the brightest in the picture, in each colour
 constexpr double blank_grain = 0.012;                     // largest standard deviation over a few pixels: wood has more
-constexpr double least_blank = 0.002;                     // of the picture
+constexpr double least_blank = 0.0005;                    // of the picture
 
 double number(Feature feature) { return static_cast<double>(feature); }
 

@@ -24,7 +24,7 @@ Vec2 upper_right(const Record& record, const std::filesystem::path& file) {
 }
 
 VirtualCameraOptions sized(VirtualCameraOptions options, const Vec2& size, double pixel) {
-    const Vec2 count = (size / pixel).array().ceil();
+    const Vec2 count = (size / pixel - Vec2::Constant(1e-6)).array().ceil();  // 1e-6 of a pixel is rounding
     if (!(count.maxCoeff() <= most_side))
         throw InputError("command line", "--pixel", fmt::format("{:g} um", 1e6 * pixel),
                          fmt::format("makes a picture of {:.0f} x {:.0f} pixels: at most {} a side", count.x(), count.y(), most_side));

@@ -108,7 +108,7 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
     if (!given.empty())
         round.borders = lines_of(given, frame);
     else if (round.obstacle.empty())
-        round.borders = find_ring_borders(gray, valid, rings, ring_width);
+        round.borders = find_ring_borders(gray, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;

@@ -81,35 +81,38 @@ Vec2 FieldComparison::in_subset(std::size_t place, const ProbeReading& reading) 
 
 std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, const ProbeReading& reading) const {
     std::vector<Vec2> values;
-    std::vector<bool> counts;
+    std::vector<double> share;  // of a point that counts
     for (const Point& point : points) {
+        double nearest = INFINITY;
+        for (const std::vector<Vec2>& crack : reading.cracks) {
+            nearest = std::min(nearest, distance_to(crack, places_[point.place]));
+        }
         const Vec2 value = in_subset(point.place, reading);
-        const bool torn = std::any_of(reading.cracks.begin(), reading.cracks.end(), [&](const std::vector<Vec2>& crack) {
-            return distance_to(crack, places_[point.place]) < reach_;
-        });
-        counts.push_back(value.allFinite() && !torn);
-        values.push_back(counts.back() ? value : point.measured);
+        share.push_back(value.allFinite() ? std::clamp(nearest / reach_ - 1, 0.0, 1.0) : 0.0);
+        values.push_back(share.back() > 0 ? value : point.measured);
     }
-    if (!camera_moves_) {
-        return values;
+    if (camera_moves_) {
+        move_with_camera(points, share, values);
     }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        values[i] = points[i].measured + share[i] * (values[i] - points[i].measured);
+    }
+    return values;
+}
+
+void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (counts[i]) {
-            const auto rows = motion_at(places_[points[i].place] / reach_);
-            const double weight = 1 / (points[i].sigma * points[i].sigma);
-            normal += weight * rows.transpose() * rows;
-            right += weight * rows.transpose() * (points[i].measured - values[i]);
-        }
+        const auto rows = motion_at(places_[points[i].place] / reach_);
+        const double weight = std::pow(share[i] / points[i].sigma, 2);
+        normal += weight * rows.transpose() * rows;
+        right += weight * rows.transpose() * (points[i].measured - values[i]);
     }
     const Eigen::Vector3d motion = normal.completeOrthogonalDecomposition().solve(right);
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (counts[i]) {
-            values[i] += motion_at(places_[points[i].place] / reach_) * motion;
-        }
+        values[i] += motion_at(places_[points[i].place] / reach_) * motion;
     }
-    return values;
 }
 
 std::vector<double> FieldComparison::modelled(const Record& record) const {

@@ -17,7 +17,8 @@ namespace crampfit {
 /// 1973). Then a field tells how strains go from place to place, and stiffness needs a force beside it.
 ///
 /// A point whose subset the simulated crack reaches is left out: there the record says what was measured. So is one that lies off the
-/// simulated material.
+/// simulated material. Beyond, over the same distance once more, points come to count little by little, so that residuals are continuous
+/// in the crack's length.
 class FieldComparison {
   public:
     /// The experiment must have fields.
@@ -38,6 +39,7 @@ class FieldComparison {
         double sigma;
     };
     std::vector<Vec2> modelled(const std::vector<Point>& points, const ProbeReading& reading) const;
+    void move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const;
     Vec2 in_subset(std::size_t place, const ProbeReading& reading) const;
 
     std::vector<Vec2> places_;                 // [m]
