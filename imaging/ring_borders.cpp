@@ -14,7 +14,6 @@ constexpr double least_known = 0.3;       // share of a place's surroundings tha
 constexpr double least_prominence = 0.35; // of a rise, against the contrast around it
 constexpr double least_contrast = 0.3;    // of a place, against the picture's
 constexpr double least_support = 0.5;     // share of profiles that must show a border
-constexpr double stain_depth = 0.05;      // that a border may stand off its course, against the room to its neighbours
 constexpr double nearness = 0.3;          // of neighbours, up to which a rise continues a border
 
 double quantile(std::vector<float> values, double share) {
@@ -296,26 +295,6 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, 
     return {rows.begin<float>(), rows.end<float>()};
 }
 
-/// Median of the rows within `reach` columns of each.
-std::vector<double> running_median(const std::vector<double>& row, int reach) {
-    const int columns = static_cast<int>(row.size());
-    std::vector<double> median;
-    for (int u = 0; u < columns; ++u)
-        median.push_back(quantile({row.begin() + std::max(0, u - reach), row.begin() + std::min(columns, u + reach + 1)}, 0.5));
-    return median;
-}
-
-/// A stain in front of LW, or one that LW ends in, is nearly as dark as LW: its far edge is the steeper one. It is short against the ring,
-/// and straightened rings are as good as straight: where the border stands off its course, it is laid anew along that.
-void lay_past_stains(const cv::Mat& slope, double room, std::vector<double>& row) {
-    const int most_off = std::max(2, static_cast<int>(std::lround(stain_depth * room)));
-    const std::vector<double> course = running_median(row, static_cast<int>(std::lround(room)));
-    const std::vector<double> along = lay(slope, course, most_off);
-    for (std::size_t u = 0; u < row.size(); ++u)
-        if (std::abs(row[u] - course[u]) > most_off)
-            row[u] = along[u];
-}
-
 /// Profiles across the rings, each a blurred stretch of them apart.
 std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                    double ring_width) {
@@ -392,9 +371,7 @@ std::vector<BorderLine> lay_borders(const cv::Mat& gray, const cv::Mat& valid, c
         for (int u = 0; u < gray.cols; ++u)
             guess[u] = track.row_at((u + 0.5) * static_cast<double>(profiles) / gray.cols - 0.5);
         const int reach = static_cast<int>(std::clamp(0.15 * track.room, 2.0, 15.0));
-        std::vector<double> row = lay(slope, guess, reach);
-        lay_past_stains(slope, track.room, row);
-        BorderLine line = in_frame(row, valid, rings);
+        BorderLine line = in_frame(lay(slope, guess, reach), valid, rings);
         line.support = track.support;
         if (line.v.size() > 1)
             borders.push_back(std::move(line));
