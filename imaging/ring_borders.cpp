@@ -275,7 +275,8 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, 
                 gain.at<float>(j, u) = std::max(0.0f, slope.at<float>(row, u));
         double peak = 0;
         cv::minMaxLoc(gain.col(u), nullptr, &peak);
-        peaks.push_back(static_cast<float>(peak));
+        if (peak > 0)  // else there is nothing in this column, such as beside a specimen that is narrower than its picture
+            peaks.push_back(static_cast<float>(peak));
     }
     gain /= std::max(quantile(peaks, 0.5), 1e-6);
     cv::min(gain, 1.5, gain);
