@@ -34,6 +34,7 @@ ExitStatus exit_status(RunStatus status) {
 Record run(const Scene& scene, const CommonOptions& common) {
     ProgressLine line(common, "steps");
     SimulateOptions options;
+    options.threads = common.threads;
     options.stop_requested = &stop_requested();
     options.progress = [&](const Progress& progress) {
         line.show(progress.fraction, progress.step,

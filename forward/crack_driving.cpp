@@ -11,6 +11,12 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
+double length_of(const std::vector<Vec2>& route) {
+    double length = 0.0;
+    for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();
+    return length;
+}
+
 // Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
 LoadState weighted(const std::vector<const LoadState*>& states, const std::vector<double>& weights) {
     LoadState sum;
@@ -72,9 +78,17 @@ LoadState scaled(const LoadState& state, double factor) {
     return at;
 }
 
+LoadState between(const LoadState& from, const LoadState& to, double time) {
+    const double span = to.time - from.time;
+    const double s = (time - from.time) / span;
+    LoadState found = weighted({&from, &to}, {1.0 - s, s});
+    found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
+    return found;
+}
+
 double Station::route_length() const {
     double length = 0.0;
-    for (std::size_t k = 0; k + 1 < route.size(); ++k) length += (route[k + 1] - route[k]).norm();
+    for (const MovingTip& tip : moving) length += length_of(tip.route);
     return length;
 }
 
@@ -88,6 +102,28 @@ double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& rou
         for (int i = 0; i < samples; ++i)
             sum += leg / samples * materials.at(route[k] + (i + 0.5) / samples * (route[k + 1] - route[k])).toughness;
         length += leg;
+    }
+    return sum / length;
+}
+
+LoadState LoadState::gone_on(double to) const {
+    const double ratio = to / time;
+    const double exponent = potential > 0.0 ? std::clamp(power * time / potential, 1.0, 4.0) : 2.0;
+    LoadState at = scaled(*this, std::pow(ratio, exponent - 1.0));
+    at.time = to;
+    at.potential = potential * std::pow(ratio, exponent);
+    at.displacement = displacement * ratio;
+    for (std::size_t k = 0; k < tips.size(); ++k) at.tips[k].G = tips[k].G * std::pow(ratio, exponent);
+    return at;
+}
+
+double mean_toughness(const MaterialMap& materials, const std::vector<MovingTip>& moving) {
+    if (moving.size() == 1 || moving.front().route.size() == 1) return mean_toughness(materials, moving.front().route);
+    double sum = 0.0;
+    double length = 0.0;
+    for (const MovingTip& tip : moving) {
+        sum += length_of(tip.route) * mean_toughness(materials, tip.route);
+        length += length_of(tip.route);
     }
     return sum / length;
 }
@@ -122,21 +158,16 @@ LoadState Station::at(double time) const {
     } else {
         auto next = std::next(states.begin());
         while (std::next(next) != states.end() && next->second.time < t) ++next;
-        const LoadState& from = std::prev(next)->second;
-        const LoadState& to = next->second;
-        const double span = to.time - from.time;
-        const double s = (t - from.time) / span;
-        found = weighted({&from, &to}, {1.0 - s, s});
-        found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
+        found = between(std::prev(next)->second, next->second, t);
     }
     found.time = time;
     if (time > still_from) found.power = 0.0;
     return found;
 }
 
-double Station::critical_time(double toughness) const {
-    const std::size_t tip = 2 * crack + at_end;
-    const bool finite_advance = route.size() > 1;
+double Station::critical_time(double toughness, bool beyond) const {
+    const std::size_t tip = 2 * moving.front().crack + moving.front().at_end;
+    const bool finite_advance = route_length() > 0.0;
     const double needed = finite_advance ? toughness * route_length() * thickness : toughness;
     // Where what is released and what it costs are both known: what is left over [J, or J/m^2 for advance 0], and its slope.
     std::vector<double> time, excess, slope;
@@ -148,7 +179,17 @@ double Station::critical_time(double toughness) const {
         slope.push_back(finite_advance ? state.power - further->second[1] : 0.0);
     }
     if (time.empty()) return never;
-    if (time.size() == 1) return excess[0] >= 0.0 ? time[0] : never;
+    const auto power_law = [&](std::size_t from, std::size_t to, std::size_t start) {
+        const double ratio = (excess[to] + needed) / (excess[from] + needed);
+        const double power = ratio > 0.0 && time[from] > 0.0 && to != from ? std::log(ratio) / std::log(time[to] / time[from]) : 2.0;
+        return time[start] * std::pow(needed / (excess[start] + needed), 1.0 / std::max(power, 0.5));
+    };
+    if (beyond && excess.back() < 0.0) {
+        const std::size_t last = time.size() - 1;
+        const double reached = excess[last] + needed > 0.0 ? power_law(last > 0 ? last - 1 : last, last, last) : never;
+        return reached <= still_from * (1.0 + 1e-12) ? reached : never;
+    }
+    if (time.size() == 1) return beyond ? power_law(0, 0, 0) : excess[0] >= 0.0 ? time[0] : never;
     double found = never;
     if (linear) {  // times 0, T/2, T
         const double T = time[2];
@@ -163,8 +204,7 @@ double Station::critical_time(double toughness) const {
         if (excess[i - 1] >= 0.0) {
             // Below what is known: the energy released goes as a power of the time.
             if (time[i - 1] == 0.0) return 0.0;
-            const double power = std::log((excess[i] + needed) / (excess[i - 1] + needed)) / std::log(time[i] / time[i - 1]);
-            return time[i - 1] * std::pow(needed / (excess[i - 1] + needed), 1.0 / std::max(power, 0.5));
+            return power_law(i - 1, i, i - 1);
         }
         double low = 0.0, high = 1.0;
         for (int k = 0; k < 60; ++k) {

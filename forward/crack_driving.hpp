@@ -17,6 +17,9 @@ struct LoadState {
     double displacement = 0;        // of the measured edge or body [m]
     std::vector<Vec2> reactions;    // [drivers] [N]
     std::vector<TipLoad> tips;      // two a crack: start, end
+
+    /// What it is roughly like at another time, if the potential goes as the power of the time that its slope says.
+    LoadState gone_on(double to) const;
 };
 
 /// The same equilibrium at another load, where everything goes linearly with the load from none on.
@@ -25,38 +28,50 @@ LoadState scaled(const LoadState& state, double factor);
 /// Takes off a third of the difference to a grid with cells twice as wide, all but G and K.
 void extrapolate(LoadState& fine, const LoadState& coarse);
 
+/// What lies between two equilibria of the same crack, at a time.
+LoadState between(const LoadState& from, const LoadState& to, double time);
+
+/// A tip that moves on from a place, and where it goes over the next `advance`, from the tip on; only the tip for advance 0 [m].
+struct MovingTip {
+    int crack;
+    bool at_end;
+    std::vector<Vec2> route;
+};
+
 /// A crack length and what is known of it: equilibria at several times, and how much energy the next `advance` would release.
 struct Station {
     std::vector<std::array<Vec2, 2>> tips;  // [cracks] start, end [m]
     std::vector<double> lengths;            // [cracks] [m]
     bool left = false;                      // no tip can grow: each has reached a free surface, or none was to grow
     bool grows = false;                     // some tip was to grow
-    int crack = -1;                         // the tip that moves on from here; -1: none can
-    bool at_end = true;
-    std::vector<Vec2> route;                // where it goes over the next `advance`, from its tip on; only the tip for advance 0
+    std::vector<MovingTip> moving;          // the tips that move on from here, together; empty: none can
     double thickness = 0;                   // [m]
     bool linear = true;                     // goes linearly with the load: three states say all
     double still_from = 0;                  // nothing moves any more from this time on [s]; infinite: never
     std::map<int, LoadState> states;        // by number of the time
-    std::map<int, std::array<double, 2>> ahead;  // the same: potential [J] and power [W] with the tip at the route's end
+    std::map<int, std::array<double, 2>> ahead;  // the same: potential [J] and power [W] with the tips at their routes' ends
 
-    double route_length() const;            // [m]
+    double route_length() const;            // of all tips that move [m]
 
     /// Every growing tip has reached a free surface.
     bool split() const { return left && grows; }
 
     /// True where both sides of the balance are known at a time.
-    bool ahead_known(int time) const { return states.count(time) && (route.size() < 2 || ahead.count(time)); }
+    bool ahead_known(int time) const { return states.count(time) && (route_length() == 0.0 || ahead.count(time)); }
 
     /// What it is like at a time: in a linear scene exact, else between the two states about it, which must be there.
     LoadState at(double time) const;
 
-    /// The first time at which the next advance releases as much energy as it costs, with `toughness` the mean over the route
-    /// [J/m^2], between what is known; infinite where it does not within that [s].
-    double critical_time(double toughness) const;
+    /// The first time at which the next advance releases as much energy as it costs, with `toughness` the mean over the routes
+    /// [J/m^2], between what is known; infinite where it does not within that [s]. `beyond` it: the energy released goes on as a power
+    /// of the time.
+    double critical_time(double toughness, bool beyond = false) const;
 };
 
 /// Mean toughness of the wood along a route; of one place, at it [J/m^2].
 double mean_toughness(const MaterialMap& materials, const std::vector<Vec2>& route);
+
+/// The same over the routes of all tips that move.
+double mean_toughness(const MaterialMap& materials, const std::vector<MovingTip>& moving);
 
 } // namespace crampfit

@@ -21,6 +21,15 @@ constexpr double pair_compliance = 4.2;
 // exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
 constexpr double tip_lag = 0.25;
 
+// A tip that comes nearer to another crack than this part of a cell has met it.
+constexpr double meeting_distance = 0.5;
+
+// Cracks that meet at less than this angle, the tip of one at the tip of the other, become one; else one runs into the other's face.
+constexpr double least_sine_of_a_junction = 0.5;
+
+// How far ahead of where a crack ends, at a hole or on another crack, a node's support can still be cut by it, in cells.
+constexpr double reach_of_an_end = 1.5;
+
 // Masks are kept in eight bits.
 constexpr int most_cracks = 8;
 
@@ -94,6 +103,15 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
         line.length = length_inside(line.points, {Vec2::Zero(), body.layout.size()});
         lines.push_back(line);
     }
+    for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
+        for (const bool at_end : {false, true}) {
+            CrackTip& tip = lines[k].tip(at_end);
+            const double hair = 1e-3 * body.layout.cell.minCoeff();
+            if (!tip.inside) continue;
+            const auto found = meeting(k, tip.position - hair * tip.direction, tip.position + hair * tip.direction, hair);
+            if (found) end_at(tip, *found);  // it begins on another crack
+        }
+    }
     const Box everywhere{Vec2::Zero(), body.layout.size()};
     for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
         sort_points(k, everywhere);
@@ -137,13 +155,73 @@ bool CrackFields::is_left(int crack, const Vec2& x) const {
     return side >= -rounding;
 }
 
+// Where a straight step of a crack first meets another one, or comes nearer to it than `near`.
+std::optional<CrackFields::Meeting> CrackFields::meeting(int crack, const Vec2& from, const Vec2& to, double near) const {
+    const Vec2 step = to - from;
+    std::optional<Meeting> found;
+    double first = 1.0;
+    double nearest = near;
+    for (int k = 0; k < static_cast<int>(lines.size()); ++k) {
+        const auto& points = lines[k].points;
+        for (std::size_t i = 0; i + 1 < points.size() && k != crack; ++i) {
+            const Vec2 along = points[i + 1] - points[i];
+            const double turn = cross(step, along);
+            const double gone = turn != 0.0 ? cross(points[i] - from, along) / turn : -1.0;  // of the step, where the lines cross
+            const double there = turn != 0.0 ? cross(points[i] - from, step) / turn : -1.0;
+            if (gone > 1e-9 && gone <= first && there >= 0.0 && there <= 1.0) {
+                first = gone;
+                nearest = 0.0;
+                found = {from + gone * step, k, along.normalized()};
+            }
+            const auto place_near = [&](const Vec2& x) { return Vec2(points[i] + nearest_on_segment(points[i], points[i + 1], x) * along); };
+            const double distance = (place_near(to) - to).norm();
+            if (distance >= nearest || distance >= (1.0 - 1e-9) * (place_near(from) - from).norm()) continue;  // it must come nearer
+            nearest = distance;
+            found = {place_near(to), k, along.normalized()};
+        }
+    }
+    return found;
+}
+
+// Ends a tip where its crack meets another one.
+void CrackFields::end_at(CrackTip& tip, const Meeting& there) {
+    const double h = body_->layout.cell.minCoeff();
+    tip.position = there.at;
+    tip.inside = false;
+    bool one = false;
+    for (const bool at_end : {false, true}) {
+        CrackTip& other = lines[there.crack].tip(at_end);
+        if ((other.position - there.at).norm() > meeting_distance * h) continue;
+        one |= std::abs(cross(tip.direction, other.direction)) < least_sine_of_a_junction;
+        if (!other.inside) continue;
+        other.inside = false;
+        renew_ties(there.crack);
+    }
+    if (one) return;
+    tip.wall = there.crack;
+    tip.wall_on_left = is_left(there.crack, there.at - 0.5 * h * tip.direction);
+}
+
+// Beyond the face of another crack at which this one ends.
+bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
+    for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
+        if (tip->wall < 0 || (x - tip->position).dot(tip->direction) < -3.0 * body_->layout.cell.maxCoeff()) continue;
+        if (is_left(tip->wall, x) != tip->wall_on_left) return true;
+    }
+    return false;
+}
+
 double CrackFields::freed(int crack, int node) const {
     const Vec2 x = body_->layout.node_position(node);
     const Box support{x - body_->layout.cell, x + body_->layout.cell};
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
-        if (!tip->inside) continue;
         if (!exit_distance(tip->position, tip->direction, support)) continue;
+        if (!tip->inside) {  // at a hole or on another crack the cut ends
+            const Vec2 reach = reach_of_an_end * tip->direction.cwiseProduct(body_->layout.cell);
+            if ((x - tip->position).dot(tip->direction) > reach.norm()) return 0.0;
+            continue;
+        }
         // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
         // and would free the nodes far off an oblique crack too early.
         const Vec2 cell_along = tip->direction.cwiseProduct(body_->layout.cell);
@@ -163,7 +241,7 @@ void CrackFields::sort_points(int crack, const Box& window) {
             const bool node_left = is_left(crack, layout.node_position(nodes[k]));
             const bool split = freed(crack, nodes[k]) >= least_freed_;
             for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-                const bool apart = is_left(crack, points.position[p]) != node_left;
+                const bool apart = is_left(crack, points.position[p]) != node_left && !beyond_wall(crack, points.position[p]);
                 std::uint8_t& mask = mask_[p][k];
                 const bool was_apart = mask & bit;
                 mask = static_cast<std::uint8_t>(apart && (split || was_apart) ? mask | bit : mask & ~bit);
@@ -222,10 +300,11 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
     tip.direction = step.normalized();
     tip.position = to;
     tip.inside = is_inside(to);
-    line.length += length_inside({from, to}, {Vec2::Zero(), body_->layout.size()});
-    const bool straight = std::abs(cross(old_direction, tip.direction)) < 1e-9;
-    if (straight) (at_end ? line.points.back() : line.points.front()) = to;
-    else line.points.insert(at_end ? line.points.end() : line.points.begin(), to);
+    if (const auto found = meeting(crack, from, to, meeting_distance * body_->layout.cell.minCoeff())) end_at(tip, *found);
+    line.length += length_inside({from, tip.position}, {Vec2::Zero(), body_->layout.size()});
+    const bool straight = std::abs(cross(old_direction, (tip.position - from).normalized())) < 1e-9;
+    if (straight) (at_end ? line.points.back() : line.points.front()) = tip.position;
+    else line.points.insert(at_end ? line.points.end() : line.points.begin(), tip.position);
 
     new_fields_.clear();
     sort_points(crack, window(from, to));

@@ -3,6 +3,7 @@
 #include "forward/discretisation.hpp"
 
 #include <map>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -10,9 +11,11 @@ namespace crampfit {
 /// One end of a crack.
 struct CrackTip {
     bool grows = false;
-    bool inside = false;     // the tip lies in the material; a crack that starts on a side has one tip only
+    bool inside = false;     // the tip lies in the material; a crack that starts on a side, or on another crack, has one tip only
     Vec2 position;           // undeformed [m]
     Vec2 direction;          // unit, ahead
+    int wall = -1;           // another crack into whose face this one has run: wood beyond it does not feel this crack
+    bool wall_on_left = false;  // of the wall, seen from its start: the side where this crack lies
 };
 
 /// A crack as a line in the undeformed specimen, from its `start` to its `end`.
@@ -71,7 +74,8 @@ class CrackFields {
 
     int fields() const { return static_cast<int>(node_of_field.size()); }
 
-    /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Returns the fields that this adds.
+    /// Moves a tip of a crack straight to a new place; the points and pairs near it follow. Where it meets another crack on the way, or
+    /// comes so near that the grid does not tell, it ends there. Returns the fields that this adds.
     std::vector<NewField> grow(int crack, bool at_end, const Vec2& to);
 
     /// Where points change sides when a tip goes from one place to another.
@@ -85,6 +89,14 @@ class CrackFields {
 
   private:
     bool is_left(int crack, const Vec2& x) const;
+    struct Meeting {
+        Vec2 at;      // [m]
+        int crack;
+        Vec2 along;   // unit, of that crack there
+    };
+    std::optional<Meeting> meeting(int crack, const Vec2& from, const Vec2& to, double near) const;
+    void end_at(CrackTip& tip, const Meeting& there);
+    bool beyond_wall(int crack, const Vec2& x) const;
     double freed(int crack, int node) const;
     bool is_inside(const Vec2& x) const;
     void sort_points(int crack, const Box& window);

@@ -2,6 +2,7 @@
 
 #include "forward/discretisation.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace crampfit {
@@ -67,46 +68,71 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
 }
 
 /// Second derivative of the energy of `elastic_state` by the displacement gradient, counted xx, xy, yx, yy [Pa]; without `geometric`
-/// only the part that is never negative, which leaves out that stress turns with the point.
-inline Eigen::Matrix4d elastic_tangent(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates, bool geometric = true) {
-    Eigen::Matrix<double, 3, 4> B;
+/// only the part that is never negative, which leaves out that stress turns with the point. Numbers are `double`, or arrays of them for
+/// many points at once. Stiffness is counted xx-xx, xx-yy, yy-yy, xy-xy, xx-xy, yy-xy.
+template <class Number>
+std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, bool rotates,
+                                                     bool geometric) {
+    using std::sqrt;
+    std::array<std::array<Number, 4>, 4> A;
     if (!rotates) {
-        B << 1, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0;
-        return B.transpose() * stiffness * B;
+        A[0] = {C[0], C[4], C[4], C[1]};
+        A[1] = A[2] = {C[4], C[3], C[3], C[5]};
+        A[3] = {C[1], C[5], C[5], C[2]};
+        return A;
     }
     // In the frame that turns: p = B^T s, so dp = B^T C B dG + dB^T s, and the turning adds dtheta J p. dB comes from dU = B dG.
-    const Polar polar(gradient);
-    B = polar.strain_slope();
-    const Mat2& U = polar.stretch;
-    const double t = polar.trace;
-    const Eigen::Vector3d s = stiffness * Eigen::Vector3d(U(0, 0) - 1.0, U(1, 1) - 1.0, 2.0 * U(0, 1));
-    const Eigen::Vector4d p = B.transpose() * s;
-    const Eigen::RowVector4d dt = B.row(0) + B.row(1);
-    const auto per_trace = [&](double u, const Eigen::RowVector4d& du) { return Eigen::RowVector4d(du / t - u / (t * t) * dt); };
-    const Eigen::RowVector4d d00 = per_trace(U(0, 0), B.row(0));
-    const Eigen::RowVector4d d11 = per_trace(U(1, 1), B.row(1));
-    const Eigen::RowVector4d d01 = per_trace(U(0, 1), 0.5 * B.row(2));
-    Eigen::Matrix4d A = B.transpose() * (stiffness * B);
+    const auto& [xx, xy, yx, yy] = gradient;
+    const Number along = 2.0 + xx + yy;
+    const Number across = yx - xy;
+    const Number r = 1.0 / sqrt(along * along + across * across);  // 1 / tr U
+    const Number cosine = along * r;
+    const Number sine = across * r;
+    const Number U_xx = cosine * (1.0 + xx) + sine * yx;
+    const Number U_yy = cosine * (1.0 + yy) - sine * xy;
+    const Number U_xy = cosine * xy + sine * (1.0 + yy);
+    const Number u = U_xx * r, v = U_yy * r, w = U_xy * r;
+    const auto times_B = [&](const Number& of_xx, const Number& of_yy, const Number& of_xy) {
+        const Number skew = w * (of_yy - of_xx);
+        return std::array<Number, 4>{of_xx, skew + 2.0 * u * of_xy, 2.0 * v * of_xy - skew, of_yy};
+    };
+    const std::array<Number, 4> x = times_B(C[0], C[1], C[4]);  // rows of C B
+    const std::array<Number, 4> y = times_B(C[1], C[2], C[5]);
+    const std::array<Number, 4> s = times_B(C[4], C[5], C[3]);
+    for (int j = 0; j < 4; ++j) {
+        const std::array<Number, 4> column = times_B(x[j], y[j], s[j]);
+        for (int i = 0; i < 4; ++i) A[i][j] = column[i];
+    }
     if (geometric) {
-        A.row(1) += (s[1] - s[0]) * d01 + 2.0 * s[2] * d00;
-        A.row(2) += (s[0] - s[1]) * d01 + 2.0 * s[2] * d11;
-        A += Eigen::Vector4d(-p[2], -p[3], p[0], p[1]) * Eigen::RowVector4d(0, -1, 1, 0) / t;
+        const Number e_xx = U_xx - 1.0, e_yy = U_yy - 1.0, shear = 2.0 * U_xy;
+        const Number s_xx = C[0] * e_xx + C[1] * e_yy + C[4] * shear;
+        const Number s_yy = C[1] * e_xx + C[2] * e_yy + C[5] * shear;
+        const Number s_xy = C[4] * e_xx + C[5] * e_yy + C[3] * shear;
+        const std::array<Number, 4> p = times_B(s_xx, s_yy, s_xy);
+        const Number difference = r * (s_yy - s_xx);
+        const Number twice = 2.0 * r * s_xy;
+        const std::array<Number, 4> d_u{1.0 - u, -w, w, -u};  // over r: of U_xx / tr U, U_yy / tr U, U_xy / tr U
+        const std::array<Number, 4> d_v{-v, w, -w, 1.0 - v};
+        const std::array<Number, 4> d_w{-w, u, v, -w};
+        for (int j = 0; j < 4; ++j) {
+            A[1][j] += difference * d_w[j] + twice * d_u[j];
+            A[2][j] += twice * d_v[j] - difference * d_w[j];
+        }
+        const std::array<Number, 4> turned{-p[2], -p[3], p[0], p[1]};
+        for (int i = 0; i < 4; ++i) {
+            A[i][1] -= r * turned[i];
+            A[i][2] += r * turned[i];
+        }
     }
-    // Turned back: first index by R from the left, second by R^T from the right.
-    const double c = polar.turn(0, 0);
-    const double w = polar.turn(1, 0);
-    for (int j = 0; j < 2; ++j) {
-        const Eigen::RowVector4d x = A.row(j);
-        const Eigen::RowVector4d y = A.row(2 + j);
-        A.row(j) = c * x - w * y;
-        A.row(2 + j) = w * x + c * y;
-    }
-    for (int j = 0; j < 2; ++j) {
-        const Eigen::Vector4d x = A.col(j);
-        const Eigen::Vector4d y = A.col(2 + j);
-        A.col(j) = c * x - w * y;
-        A.col(2 + j) = w * x + c * y;
-    }
+    const auto turn = [&](Number& first, Number& second) {
+        const Number before = first;
+        first = cosine * before - sine * second;
+        second = sine * before + cosine * second;
+    };
+    for (int j = 0; j < 2; ++j)
+        for (int i = 0; i < 4; ++i) turn(A[j][i], A[2 + j][i]);
+    for (int j = 0; j < 2; ++j)
+        for (int i = 0; i < 4; ++i) turn(A[i][j], A[i][2 + j]);
     return A;
 }
 

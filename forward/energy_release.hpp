@@ -25,6 +25,7 @@ struct TipLoad {
 struct EnergyReleaseOptions {
     double inner = 2.0;        // the part that moves rigidly with the tip
     double outer = 4.5;        // beyond it nothing moves
+    double margin = 1.0;       // and wood that changes so near beyond that makes J uncertain still
     double least_inner = 1.0;        // holds the tied pair at the tip
     double least_outer = 3.0;        // in other wood
     double least_outer_at_cracks = 2.0;

@@ -26,8 +26,9 @@ constexpr int most_iterations = 60;
 // 1e-3 of a held one.
 constexpr double least_reciprocal_condition = 1e-10;
 
-// An old tangent goes on as long as it makes the forces out of balance smaller by this: four such steps cost as much as a new one.
-constexpr double worth_keeping = 0.25;
+// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
+// as much as a new one.
+constexpr double worth_keeping = 5.0;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -35,10 +36,10 @@ constexpr double least_strain = 1e-5;
 
 } // namespace
 
-Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body)
+Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, plan.rotates),
-      factor_(body.layout.cells_x, body.layout.cells_y) {
+      factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body);
@@ -57,6 +58,7 @@ void Equilibrium::renumber() {
     mass_ = field_masses(body_, fields);
     equation_.assign(2 * fields, 0);
     for (const Boundary::Held& held : boundary_.held) equation_[2 * held.field + held.axis] = -1;
+    for (const int dof : pieces_.holds) equation_[dof] = -1;
     std::vector<int> count(body_.layout.nodes(), 0);
     for (int dof = 0; dof < 2 * fields; ++dof) {
         if (mass_[dof / 2] == 0.0) equation_[dof] = -1;
@@ -81,6 +83,9 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
     boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
+    // A tip that ends may cut a piece free; where bodies slide, contact decides what can move.
+    if (sliding_.empty() && (!cracks_.lines[crack].tip(at_end).inside || !pieces_.holds.empty()))
+        pieces_ = find_loose_pieces(body_, cracks_, boundary_, field_masses(body_, cracks_.fields()));
     renumber();
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
@@ -88,7 +93,7 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
 
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
     const double gap = (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal);
-    if (gap >= 0.0) return Mat2::Zero();
+    if (gap >= 0.0 || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
     const double stiffness = face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
     if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) return stiffness * Mat2::Identity();
     return stiffness * pair.normal * pair.normal.transpose();
@@ -126,44 +131,51 @@ void Equilibrium::find_forces() {
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
 
-// What prescribed components still have to go loads the others.
-GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+GridFactor::Element Equilibrium::element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {
     GridFactor::Element made{{}, stiffness};
     for (int a = 0; a < 8; ++a) made.equation[a] = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
-    for (int b = 0; b < 8; ++b) {
-        const double step = fields[b / 2] < 0 ? 0.0 : prescribed_step_[2 * fields[b / 2] + b % 2];
-        if (made.equation[b] >= 0 || step == 0.0) continue;
-        for (int a = 0; a < 8; ++a)
-            if (made.equation[a] >= 0) step_load_[made.equation[a]] -= stiffness(a, b) * step;
-    }
     return made;
 }
 
-void Equilibrium::add_points(int c, bool geometric, std::vector<GridFactor::Element>& elements) {
-    const Points& points = body_.points;
-    const auto add_point = [&](int p, Eigen::Matrix<double, 8, 8>& sum) {
-        const CellWeights& w = body_.weights[points.slot[p]];
-        const Eigen::Matrix4d A =
-            points.volume[p] * elastic_tangent(plan_.rotates ? gradient_at(body_, p, displacement_) : Mat2::Zero(),
-                                               points.stiffness_of(p), plan_.rotates, geometric);
-        for (int b = 0; b < 4; ++b) {
-            for (int k = 0; k < 2; ++k) {
-                const Eigen::Vector4d stress = w.slope_x[b] * A.col(2 * k) + w.slope_y[b] * A.col(2 * k + 1);  // per displacement
-                for (int a = 0; a < 4; ++a) {
-                    sum(2 * a, 2 * b + k) += stress[0] * w.slope_x[a] + stress[1] * w.slope_y[a];
-                    sum(2 * a + 1, 2 * b + k) += stress[2] * w.slope_x[a] + stress[3] * w.slope_y[a];
-                }
-            }
+// What prescribed components still have to go loads the others.
+void Equilibrium::add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    for (int b = 0; b < 8; ++b) {
+        const double step = fields[b / 2] < 0 ? 0.0 : prescribed_step_[2 * fields[b / 2] + b % 2];
+        if (step == 0.0) continue;
+        for (int a = 0; a < 8; ++a) {
+            const int row = fields[a / 2] < 0 ? -1 : equation_[2 * fields[a / 2] + a % 2];
+            if (row >= 0) step_load_[row] -= stiffness(a, b) * step;
         }
-    };
+    }
+}
+
+void Equilibrium::add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) {
+    extra_.emplace(cell, element(fields, stiffness));
+    add_step_load(fields, stiffness);
+}
+
+// Points of a cell that follow each other on the same fields go together.
+template <class Visit>
+void Equilibrium::for_groups_of(int c, const Visit& visit) const {
+    const Points& points = body_.points;
     int p = points.first_of_cell[c];
     const int last = points.first_of_cell[c + 1];
-    while (p < last) {  // points side by side on the same fields go together
-        const std::array<int, 4>& fields = points.node[p];
-        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
-        for (; p < last && points.node[p] == fields; ++p) add_point(p, sum);
-        elements.push_back(element(fields, sum));
+    while (p < last) {
+        const int first = p;
+        while (p < last && points.node[p] == points.node[first]) ++p;
+        visit(points.node[first], first, p - first);
     }
+}
+
+// What prescribed components that still have to go put on the points' cells.
+void Equilibrium::add_step_loads(bool geometric) {
+    const auto goes = [&](int f) { return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0; };
+    if (std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; })) return;
+    for (int c = 0; c < body_.layout.cells(); ++c)
+        for_groups_of(c, [&](const std::array<int, 4>& fields, int first, int count) {
+            if (std::any_of(fields.begin(), fields.end(), goes))
+                add_step_load(fields, internal_force_.tangent(first, count, displacement_, geometric));
+        });
 }
 
 void Equilibrium::add_pairs() {
@@ -179,7 +191,7 @@ void Equilibrium::add_pairs() {
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
-        extra_.emplace(cell, element({pair.left, pair.right, -1, -1}, both));
+        add_extra(cell, {pair.left, pair.right, -1, -1}, both);
     }
 }
 
@@ -189,7 +201,7 @@ void Equilibrium::add_lone_points() {
         Eigen::Matrix<double, 8, 8> tangent;
         for (int a = 0; a < 4; ++a)
             for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
-        extra_.emplace(body_.points.cell[alone.point], element(body_.points.node[alone.point], tangent));
+        add_extra(body_.points.cell[alone.point], body_.points.node[alone.point], tangent);
     }
 }
 
@@ -206,7 +218,7 @@ void Equilibrium::add_touches(bool geometric) {
             Eigen::Matrix<double, 8, 8> tangent;
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
-            extra_.emplace(body_.points.cell[facet.point], element(fields, tangent));
+            add_extra(body_.points.cell[facet.point], fields, tangent);
             const Vec2 push = stiffness * still_to_go;  // that the body's way adds, if what it touches stays the same
             for (int k = 0; k < 4; ++k)
                 for (int axis = 0; axis < 2; ++axis) {
@@ -222,12 +234,16 @@ bool Equilibrium::factor_tangent(bool geometric) {
     if (!plan_.linear) factor_.mark_all();
     step_load_.setZero(equations_);
     extra_.clear();
+    lessons_.clear();
     add_lone_points();
     add_pairs();
     add_touches(geometric);
+    add_step_loads(geometric);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
-        add_points(cell, geometric, elements);
+        for_groups_of(cell, [&](const std::array<int, 4>& fields, int first_point, int count) {
+            elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
+        });
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
     };
@@ -274,7 +290,7 @@ void Equilibrium::move(const Eigen::VectorXd& step, double share) {
 }
 
 // A full Newton step, or less of it where contact changes so much on the way that the potential has long been rising again.
-void Equilibrium::take_step(const Eigen::VectorXd& step) {
+double Equilibrium::take_step(const Eigen::VectorXd& step) {
     const double at_start = slope_along(step);
     double low = 0.0, high = 1.0, at_low = at_start, gone = 1.0;
     move(step, 1.0);
@@ -292,6 +308,33 @@ void Equilibrium::take_step(const Eigen::VectorXd& step) {
         find_forces();
         here = slope_along(step);
     }
+    return gone;
+}
+
+Eigen::VectorXd Equilibrium::forces_on_equations() const {
+    Eigen::VectorXd forces(equations_);
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) forces[equation_[dof]] = force_[dof / 2][dof % 2];
+    return forces;
+}
+
+// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes few
+// directions, which a few steps tell.
+Eigen::VectorXd Equilibrium::newton_step(Eigen::MatrixXd load) const {
+    std::vector<double> share(lessons_.size());
+    for (std::size_t k = lessons_.size(); k-- > 0;) {
+        share[k] = lessons_[k].step.dot(load.col(0)) / lessons_[k].work;
+        load.col(0) -= share[k] * lessons_[k].force;
+    }
+    factor_.solve(load);
+    for (std::size_t k = 0; k < lessons_.size(); ++k)
+        load.col(0) += (share[k] - lessons_[k].force.dot(load.col(0)) / lessons_[k].work) * lessons_[k].step;
+    return load.col(0);
+}
+
+void Equilibrium::learn(Eigen::VectorXd step, Eigen::VectorXd force) {
+    const double work = step.dot(force);
+    if (work > 1e-8 * step.norm() * force.norm()) lessons_.push_back({std::move(step), std::move(force), work});
 }
 
 Equilibrium::Outcome Equilibrium::solve(double time) {
@@ -300,6 +343,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     double residual = 0.0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         find_forces();
+        if (iteration == 0) residual = largest_residual();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
         if (renew && !factor_tangent(true) && !factor_tangent(false)) {
             if (time_ == time) return Outcome::mechanism;
@@ -308,25 +352,24 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             find_forces();
             if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
         }
-        Eigen::MatrixXd step = step_load_;
+        const Eigen::VectorXd start = forces_on_equations();
+        const Eigen::VectorXd step = newton_step(start + step_load_);
         step_load_.setZero();
-        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-            if (equation_[dof] >= 0) step(equation_[dof]) += force_[dof / 2][dof % 2];
-        factor_.solve(step);
         const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
         if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
             move_prescribed();
             move(step, 1.0);
             find_forces();
         } else {
-            take_step(step);
+            const double share = take_step(step);
+            learn(share * step, start - forces_on_equations());
         }
         double scale = least_force_;
         for (const Vec2& r : reaction_) scale = std::max(scale, r.norm());
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
         if (residual <= balance * scale) return Outcome::solved;
-        renew = residual > worth_keeping * before;
+        renew = residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
 }
@@ -359,24 +402,37 @@ double Equilibrium::power() const {
     return power;
 }
 
-TipLoad Equilibrium::load_at(int crack, bool at_end) const {
+TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const {
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
-    const std::vector<Vec2> still(displacement_.size(), Vec2::Zero());
-    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, still, still}, options);
+    const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
+    return tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still}, options);
 }
 
-Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, displacement_, time_}; }
+// Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
+void Equilibrium::mark_changes(const std::vector<std::array<int, 4>>& before) {
+    int last = -1;
+    for (int p = 0; p < body_.points.count(); ++p) {
+        const int c = body_.points.cell[p];
+        if (c == last || before[p] == body_.points.node[p]) continue;
+        last = c;
+        body_.for_cells_in({body_.layout.cell_corner(c) - 0.5 * body_.layout.cell, body_.layout.cell_corner(c) + 1.5 * body_.layout.cell},
+                           [&](int near) { factor_.mark(near); });
+    }
+}
+
+Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_}; }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
-    body_.points.node = snapshot.node;
+    const std::vector<std::array<int, 4>> before = std::exchange(body_.points.node, snapshot.node);
     boundary_.held = snapshot.held;
+    pieces_ = snapshot.pieces;
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;
     internal_force_.sort_cells();
     renumber();
-    factor_.mark_all();
+    mark_changes(before);
     find_forces();
 }
 

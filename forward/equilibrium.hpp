@@ -5,6 +5,7 @@
 #include "forward/energy_release.hpp"
 #include "forward/grid_factor.hpp"
 #include "forward/internal_force.hpp"
+#include "forward/loose_pieces.hpp"
 #include "forward/material_slope.hpp"
 #include "forward/plan.hpp"
 
@@ -18,7 +19,8 @@ namespace crampfit {
 /// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent.
 class Equilibrium {
   public:
-    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body);
+    /// Equations are solved by `threads` threads, with the same bits whatever their number.
+    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
 
     enum class Outcome { solved, not_converged, mechanism };  // mechanism: something can move without resistance
 
@@ -40,7 +42,7 @@ class Equilibrium {
     double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
-    TipLoad load_at(int crack, bool at_end) const;
+    TipLoad load_at(int crack, bool at_end) const { return load_at(crack, at_end, displacement_, materials_); }
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
     int factorisations() const { return factorisations_; }
 
@@ -57,15 +59,29 @@ class Equilibrium {
     /// The motion that this load on the points and facets would bring about [N].
     Motion yield_to(const std::vector<Vec2>& load) const;
 
-    /// Derivatives by numbers of the materials at this equilibrium: row 0 that of the potential; row 1 + i that of its slope along motion
-    /// i, as it is found anew where the number is another.
-    Eigen::MatrixXd slopes(const std::vector<MaterialSlope>& numbers, const std::vector<Motion>& motions);
+    /// Derivatives by numbers of the materials at this equilibrium.
+    struct Slopes {
+        Eigen::VectorXd potential;   // [numbers] [J / unit]
+        Eigen::MatrixXd fields;      // [2 x fields, numbers] of the potential's slope by displacements, these as they are [N / unit]
+        Eigen::MatrixXd drivers;     // [2 x drivers, numbers] and by what drivers go, of bodies that slide
+
+        /// Of the potential's slope along a motion, as it is found anew where the number is another.
+        double along(const Motion& motion, int number) const;
+    };
+    Slopes slopes(const std::vector<MaterialSlope>& numbers);
+
+    /// Derivatives of the displacements by the numbers, [numbers][fields], by the tangent that `motions` has made.
+    std::vector<std::vector<Vec2>> displacement_slopes(const Slopes& slopes) const;
+
+    /// The derivative of G at a tip by a number, with that of the displacements [J/m^2 / unit].
+    double release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope);
 
     /// Everything that growth and solution change, to come back to.
     struct Snapshot {
         CrackFields cracks;
         std::vector<std::array<int, 4>> node;
         std::vector<Boundary::Held> held;
+        LoosePieces pieces;
         std::vector<Vec2> displacement;
         double time;
     };
@@ -74,11 +90,17 @@ class Equilibrium {
     void set_displacements(const std::vector<Vec2>& displacement, double time);
 
   private:
+    TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
     void renumber();
+    void mark_changes(const std::vector<std::array<int, 4>>& fields_before);
     void find_forces();
     bool factor_tangent(bool geometric);
-    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
-    void add_points(int cell, bool geometric, std::vector<GridFactor::Element>& elements);
+    GridFactor::Element element(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
+    void add_step_load(const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    void add_step_loads(bool geometric);
+    void add_extra(int cell, const std::array<int, 4>& fields, const Eigen::Matrix<double, 8, 8>& stiffness);
+    template <class Visit>
+    void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
     void add_pairs();
     void add_touches(bool geometric);
@@ -89,7 +111,10 @@ class Equilibrium {
     double largest_residual() const;
     double slope_along(const Eigen::VectorXd& step) const;
     void move(const Eigen::VectorXd& step, double share);
-    void take_step(const Eigen::VectorXd& step);
+    double take_step(const Eigen::VectorXd& step);
+    Eigen::VectorXd forces_on_equations() const;  // out of balance [N]
+    Eigen::VectorXd newton_step(Eigen::MatrixXd load) const;
+    void learn(Eigen::VectorXd step, Eigen::VectorXd force);
     void prescribe(double time);
     void move_prescribed();
 
@@ -118,6 +143,7 @@ class Equilibrium {
     std::vector<Vec2> still_to_go_;   // [drivers] until then [m]
 
     GridFactor factor_;
+    LoosePieces pieces_;              // that cracks have cut free
     std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
     std::vector<Mat2> pair_stiffness_;  // [pairs] as last factored [N/m]
@@ -125,6 +151,12 @@ class Equilibrium {
     std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
     Eigen::VectorXd step_load_;       // what that puts on the equations [N]
     int factorisations_ = 0;
+    struct Lesson {
+        Eigen::VectorXd step;         // that was taken [m]
+        Eigen::VectorXd force;        // that it needed [N]
+        double work;                  // their product [J]
+    };
+    std::vector<Lesson> lessons_;     // since the tangent was factored
 };
 
 } // namespace crampfit

@@ -1,7 +1,8 @@
 #include "forward/deformation.hpp"
 #include "forward/equilibrium.hpp"
 
-#include <set>
+#include <algorithm>
+#include <optional>
 
 namespace crampfit {
 
@@ -18,24 +19,30 @@ Eigen::Vector4d in_turned_frame(const Polar& polar, const Mat2& gradient) {
     return {local(0, 0), local(0, 1), local(1, 0), local(1, 1)};
 }
 
+// Rate of a point's strain for each displacement component of its cell's nodes [1/m].
+Eigen::Matrix<double, 3, 8> strain_rates(const CellWeights& w, const Polar* polar) {
+    Eigen::Matrix<double, 3, 8> rates;
+    for (int k = 0; k < 4; ++k) {
+        for (int axis = 0; axis < 2; ++axis) {
+            Mat2 gradient = Mat2::Zero();
+            gradient.row(axis) << w.slope_x[k], w.slope_y[k];
+            if (polar) rates.col(2 * k + axis) = polar->strain_slope() * in_turned_frame(*polar, gradient);
+            else rates.col(2 * k + axis) << gradient(0, 0), gradient(1, 1), gradient(0, 1) + gradient(1, 0);
+        }
+    }
+    return rates;
+}
+
 } // namespace
 
 // What motions of the drivers put on the equations, by the tangent where it stands.
 Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     prescribed_step_.assign(equation_.size(), 0.0);
-    std::set<int> cells;  // that hold a component that moves
-    for (const Boundary::Held& held : boundary_.held) {
-        const double step = drivers[held.driver][held.axis];
-        if (step == 0.0) continue;
-        prescribed_step_[2 * held.field + held.axis] = step;
-        const Vec2 x = body_.layout.node_position(cracks_.node_of_field[held.field]);
-        body_.for_cells_near(x, 0.5 * body_.layout.cell.minCoeff(), [&](int c) { cells.insert(c); });
-    }
+    for (const Boundary::Held& held : boundary_.held) prescribed_step_[2 * held.field + held.axis] = drivers[held.driver][held.axis];
     still_to_go_ = drivers;
     step_load_.setZero(equations_);
     extra_.clear();
-    std::vector<GridFactor::Element> elements;
-    for (const int c : cells) add_points(c, true, elements);
+    add_step_loads(true);
     add_lone_points();
     add_pairs();
     add_touches(true);
@@ -72,40 +79,44 @@ Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
     return motion_of(std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), step);
 }
 
-Eigen::MatrixXd Equilibrium::slopes(const std::vector<MaterialSlope>& numbers, const std::vector<Motion>& motions) {
+double Equilibrium::Slopes::along(const Motion& motion, int number) const {
+    double sum = 0.0;
+    for (std::size_t f = 0; f < motion.fields.size(); ++f) sum += fields.col(number).segment<2>(2 * f).dot(motion.fields[f]);
+    for (std::size_t d = 0; d < motion.drivers.size(); ++d) sum += drivers.col(number).segment<2>(2 * d).dot(motion.drivers[d]);
+    return sum;
+}
+
+Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& numbers) {
     const Points& points = body_.points;
-    const std::size_t rows = 1 + motions.size();
-    Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(rows, numbers.size());
-    // The points: strain, and its rate along each motion.
-    Eigen::Matrix<double, 3, Eigen::Dynamic> strain(3, rows);
+    Slopes slope;
+    slope.potential = Eigen::VectorXd::Zero(numbers.size());
+    slope.fields = Eigen::MatrixXd::Zero(2 * displacement_.size(), numbers.size());
+    slope.drivers = Eigen::MatrixXd::Zero(2 * boundary_.drivers(), numbers.size());
+    const auto add = [&](std::size_t n, int field, const Vec2& force) { slope.fields.col(n).segment<2>(2 * field) += force; };
     for (int p = 0; p < points.count(); ++p) {
+        const auto changes = [&](const MaterialSlope& number) { return !number.stiffness(points.cell[p]).isZero(0.0); };
+        if (std::none_of(numbers.begin(), numbers.end(), changes)) continue;
         const Mat2 gradient = gradient_at(body_, p, displacement_);
+        Eigen::Vector3d strain(gradient(0, 0), gradient(1, 1), gradient(0, 1) + gradient(1, 0));
+        std::optional<Polar> polar;
         if (plan_.rotates) {
-            const Polar polar(gradient);
-            const Eigen::Matrix<double, 3, 4> B = polar.strain_slope();
-            strain.col(0) << polar.stretch(0, 0) - 1.0, polar.stretch(1, 1) - 1.0, 2.0 * polar.stretch(0, 1);
-            for (std::size_t i = 0; i < motions.size(); ++i)
-                strain.col(1 + i) = B * in_turned_frame(polar, gradient_at(body_, p, motions[i].fields));
-        } else {
-            for (std::size_t i = 0; i < rows; ++i) {
-                const Mat2 g = i == 0 ? gradient : gradient_at(body_, p, motions[i - 1].fields);
-                strain.col(i) << g(0, 0), g(1, 1), g(0, 1) + g(1, 0);
-            }
+            polar.emplace(gradient);
+            strain << polar->stretch(0, 0) - 1.0, polar->stretch(1, 1) - 1.0, 2.0 * polar->stretch(0, 1);
         }
+        const Eigen::Matrix<double, 3, 8> rates = strain_rates(body_.weights[points.slot[p]], polar ? &*polar : nullptr);
         for (std::size_t n = 0; n < numbers.size(); ++n) {
-            const Eigen::Matrix3d& C = numbers[n].stiffness(points.cell[p]);
-            if (C.isZero(0.0)) continue;
-            const Eigen::Vector3d stress = points.volume[p] * (C * strain.col(0));
-            slope(0, n) += 0.5 * stress.dot(strain.col(0));
-            for (std::size_t i = 1; i < rows; ++i) slope(i, n) += stress.dot(strain.col(i));
+            if (!changes(numbers[n])) continue;
+            const Eigen::Vector3d stress = points.volume[p] * (numbers[n].stiffness(points.cell[p]) * strain);
+            slope.potential[n] += 0.5 * stress.dot(strain);
+            for (int k = 0; k < 4; ++k) add(n, points.node[p][k], rates.middleCols<2>(2 * k).transpose() * stress);
         }
     }
     for (const InternalForce::Alone& alone : internal_force_.alone()) {
         const Vec2 cross = internal_force_.crosswise(alone.point, displacement_);
         for (std::size_t n = 0; n < numbers.size(); ++n) {
-            const double k = internal_force_.crosswise_stiffness(alone.point, numbers[n].stiffness(points.cell[alone.point]));
-            slope(0, n) += 0.5 * k * cross.squaredNorm();
-            for (std::size_t i = 1; i < rows; ++i) slope(i, n) += k * cross.dot(internal_force_.crosswise(alone.point, motions[i - 1].fields));
+            const Vec2 pull = internal_force_.crosswise_stiffness(alone.point, numbers[n].stiffness(points.cell[alone.point])) * cross;
+            slope.potential[n] += 0.5 * pull.dot(cross);
+            for (int k = 0; k < 4; ++k) add(n, points.node[alone.point][k], InternalForce::crosswise_sign[k] * pull);
         }
     }
     // Ties and closed faces are as stiff as their wood.
@@ -116,9 +127,9 @@ Eigen::MatrixXd Equilibrium::slopes(const std::vector<MaterialSlope>& numbers, c
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             const double stiffer = numbers[n].opening_modulus(pair.freed_at, 0.5 * body_.layout.cell, pair.along) / pair.plane_modulus;
             const Vec2 pull = stiffer * stiffness * jump;
-            slope(0, n) += 0.5 * pull.dot(jump);
-            for (std::size_t i = 1; i < rows; ++i)
-                slope(i, n) += pull.dot(motions[i - 1].fields[pair.left] - motions[i - 1].fields[pair.right]);
+            slope.potential[n] += 0.5 * pull.dot(jump);
+            add(n, pair.left, pull);
+            add(n, pair.right, -pull);
         }
     }
     // So are bodies' springs.
@@ -128,16 +139,66 @@ Eigen::MatrixXd Equilibrium::slopes(const std::vector<MaterialSlope>& numbers, c
             const int stiffest = points.stiffness[0][facet.point] >= points.stiffness[2][facet.point] ? 0 : 1;
             for (std::size_t n = 0; n < numbers.size(); ++n) {
                 const double stiffer = numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
-                slope(0, n) += stiffer * touch.energy;
-                for (std::size_t i = 1; i < rows; ++i) {
-                    Vec2 apart = -motions[i - 1].drivers[sliding_driver_[s]];
-                    for (int k = 0; k < 4; ++k) apart += facet.weight[k] * motions[i - 1].fields[points.node[facet.point][k]];
-                    slope(i, n) -= stiffer * touch.force * touch.normal.dot(apart);
-                }
+                const Vec2 push = stiffer * touch.force * touch.normal;
+                slope.potential[n] += stiffer * touch.energy;
+                for (int k = 0; k < 4; ++k) add(n, points.node[facet.point][k], -facet.weight[k] * push);
+                slope.drivers.col(n).segment<2>(2 * sliding_driver_[s]) += push;
             }
         }
     }
     return slope;
+}
+
+std::vector<std::vector<Vec2>> Equilibrium::displacement_slopes(const Slopes& slopes) const {
+    const auto numbers = slopes.fields.cols();
+    Eigen::MatrixXd step = Eigen::MatrixXd::Zero(equations_, numbers);
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) step.row(equation_[dof]) = -slopes.fields.row(dof);
+    factor_.solve(step);
+    std::vector<std::vector<Vec2>> found(numbers, std::vector<Vec2>(displacement_.size(), Vec2::Zero()));
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        for (int n = 0; n < numbers && equation_[dof] >= 0; ++n) found[n][dof / 2][dof % 2] = step(equation_[dof], n);
+    return found;
+}
+
+// By a central difference of G, displacements and wood moving with the number. Of the wood only that around the tip counts.
+double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope) {
+    constexpr double reach = 7.0;  // [cells] farther than the virtual extension
+    Points& points = body_.points;
+    struct Wood {
+        int point;
+        std::array<double, 6> constants;
+        Eigen::Vector4d layers;
+    };
+    std::vector<Wood> here;
+    const Vec2 tip = cracks_.lines[crack].tip(at_end).position;
+    body_.for_cells_near(tip, reach * body_.layout.cell.maxCoeff(), [&](int c) {
+        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
+            Wood wood{p, {}, points.layers.empty() ? Eigen::Vector4d::Zero() : points.layers[p]};
+            for (int k = 0; k < 6; ++k) wood.constants[k] = points.stiffness[k][p];
+            here.push_back(wood);
+        }
+    });
+    const auto put = [&](int p, const std::array<double, 6>& constants, const Eigen::Vector4d& layers) {
+        for (int k = 0; k < 6; ++k) points.stiffness[k][p] = constants[k];
+        if (!points.layers.empty()) points.layers[p] = layers;
+    };
+    const auto with_wood_of = [&](const MaterialMap& materials, double step) {
+        body_.for_cells_near(tip, reach * body_.layout.cell.maxCoeff(), [&](int c) {
+            const LocalWood wood = body_.wood_of_cell(materials, c);
+            const Eigen::Matrix3d C = wood.elasticity.stiffness();
+            const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
+            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p)
+                put(p, constants, wood.elasticity.coefficients.head<4>());
+        });
+        std::vector<Vec2> displacement = displacement_;
+        for (std::size_t f = 0; f < displacement.size(); ++f) displacement[f] += step * displacement_slope[f];
+        return load_at(crack, at_end, displacement, materials).G;
+    };
+    const double more = with_wood_of(number.materials(true), number.step());
+    const double less = with_wood_of(number.materials(false), -number.step());
+    for (const Wood& wood : here) put(wood.point, wood.constants, wood.layers);
+    return (more - less) / (2.0 * number.step());
 }
 
 } // namespace crampfit

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <limits>
 
 extern "C" void dpotrf_(const char* triangle, const int* order, double* matrix, const int* leading, int* info);
@@ -13,14 +14,30 @@ namespace crampfit {
 
 namespace {
 
+constexpr int most_forks = 4;
+
 constexpr int leaf_cells = 4;  // boxes no wider than this are not halved: measured, 3 to 6 are alike
 
 // Below this many unknowns a call into the BLAS costs more than the work: measured.
 constexpr int small_front = 48;
 
+// Runs two tasks side by side, or one after the other.
+template <class First, class Second>
+void run_both(bool side_by_side, const First& first, const Second& second) {
+    if (!side_by_side) {
+        first();
+        second();
+        return;
+    }
+    auto other = std::async(std::launch::async, first);
+    second();
+    other.get();
+}
+
 } // namespace
 
-GridFactor::GridFactor(int cells_x, int cells_y) : cells_x_(cells_x), cells_y_(cells_y) {
+GridFactor::GridFactor(int cells_x, int cells_y, int threads) : cells_x_(cells_x), cells_y_(cells_y) {
+    while (1 << forks_ < threads && forks_ < most_forks) ++forks_;
     // Runs of a fit go side by side, a core each; and sums must not depend on the number of threads.
     openblas_set_num_threads(1);
     const std::size_t nodes = static_cast<std::size_t>(cells_x + 1) * (cells_y + 1);
@@ -103,27 +120,20 @@ void GridFactor::set_equations(const std::vector<int>& first, const std::vector<
     count_ = count;
 }
 
-// Where the equations of each node of a box begin in its front; one more entry: the front's size.
-const std::vector<int>& GridFactor::offsets(const Box& box) {
-    offset_.resize(box.nodes.size() + 1);
-    offset_[0] = 0;
-    for (std::size_t k = 0; k < box.nodes.size(); ++k) offset_[k + 1] = offset_[k] + count_[box.nodes[k]];
-    return offset_;
-}
-
-void GridFactor::assemble_leaf(Box& box, const Assemble& assemble) {
-    elements_.clear();
-    for (const int cell : box.cells) assemble(cell, elements_);
+void GridFactor::assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const {
+    scratch.elements.clear();
+    for (const int cell : box.cells) assemble(cell, scratch.elements);
+    std::vector<int>& local = scratch.local;
     for (std::size_t k = 0; k < box.nodes.size(); ++k) {
         const int node = box.nodes[k];
         for (int e = 0; e < count_[node]; ++e) {
-            if (local_.size() <= static_cast<std::size_t>(first_[node] + e)) local_.resize(2 * (first_[node] + e) + 64);
-            local_[first_[node] + e] = offset_[k] + e;
+            if (local.size() <= static_cast<std::size_t>(first_[node] + e)) local.resize(2 * (first_[node] + e) + 64);
+            local[first_[node] + e] = box.offset[k] + e;
         }
     }
-    for (const Element& element : elements_) {
+    for (const Element& element : scratch.elements) {
         std::array<int, 8> at;
-        for (int a = 0; a < 8; ++a) at[a] = element.equation[a] < 0 ? -1 : local_[element.equation[a]];
+        for (int a = 0; a < 8; ++a) at[a] = element.equation[a] < 0 ? -1 : local[element.equation[a]];
         for (int b = 0; b < 8; ++b) {
             if (at[b] < 0) continue;
             double* column = column_of(box, at[b]);
@@ -140,7 +150,7 @@ double* GridFactor::column_of(Box& box, int c) {
 }
 
 // Adds what a half has left. Nodes that follow each other in both are taken together.
-void GridFactor::take_in(Box& box, int h) {
+void GridFactor::take_in(Box& box, int h) const {
     const Box& half = boxes_[box.half[h]];
     struct Run {
         int from, to, length;
@@ -148,7 +158,7 @@ void GridFactor::take_in(Box& box, int h) {
     std::vector<Run> runs;
     int at = 0;
     for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
-        const int to = offset_[box.slot[h][k]];
+        const int to = box.offset[box.slot[h][k]];
         const int length = count_[half.nodes[half.eliminated + k]];
         if (!runs.empty() && runs.back().to + runs.back().length == to) runs.back().length += length;
         else runs.push_back({at, to, length});
@@ -198,53 +208,112 @@ bool GridFactor::eliminate(Box& box) {
     return true;
 }
 
-bool GridFactor::factor(const Assemble& assemble) {
-    for (Box& box : boxes_) {
-        if (!box.stale) continue;
-        const std::vector<int>& offset = offsets(box);
-        box.inner = offset[box.eliminated];
-        box.border = offset.back() - box.inner;
-        box.factor.resize(offset.back(), box.inner);
-        box.left.resize(box.border, box.border);
-        for (int c = 0; c < box.inner; ++c) box.factor.col(c).tail(offset.back() - c).setZero();
-        for (int c = 0; c < box.border; ++c) box.left.col(c).tail(box.border - c).setZero();
-        if (box.half[0] < 0) assemble_leaf(box, assemble);
-        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) take_in(box, h);
-        if (!eliminate(box)) {
-            mark_all();
-            return false;
-        }
-        box.stale = false;
-    }
+bool GridFactor::factor_box(Box& box, const Assemble& assemble, Scratch& scratch) {
+    if (!box.stale) return true;
+    std::vector<int>& offset = box.offset;
+    offset.resize(box.nodes.size() + 1);
+    offset[0] = 0;
+    for (std::size_t k = 0; k < box.nodes.size(); ++k) offset[k + 1] = offset[k] + count_[box.nodes[k]];
+    box.inner = offset[box.eliminated];
+    box.border = offset.back() - box.inner;
+    box.factor.resize(offset.back(), box.inner);
+    box.left.resize(box.border, box.border);
+    for (int c = 0; c < box.inner; ++c) box.factor.col(c).tail(offset.back() - c).setZero();
+    for (int c = 0; c < box.border; ++c) box.left.col(c).tail(box.border - c).setZero();
+    if (box.half[0] < 0) assemble_leaf(box, assemble, scratch);
+    for (int h = 0; h < 2 && box.half[0] >= 0; ++h) take_in(box, h);
+    if (!eliminate(box)) return false;
+    box.stale = false;
     return true;
+}
+
+// Boxes within a box follow each other; this is the first of them.
+int GridFactor::first_within(int box) const {
+    while (boxes_[box].half[0] >= 0) box = boxes_[box].half[0];
+    return box;
+}
+
+bool GridFactor::factor_within(int top, int forks, const Assemble& assemble) {
+    Box& box = boxes_[top];
+    Scratch scratch;
+    if (forks == 0 || box.half[0] < 0) {
+        for (int b = first_within(top); b <= top; ++b)
+            if (!factor_box(boxes_[b], assemble, scratch)) return false;
+        return true;
+    }
+    bool first = true, second = true;
+    run_both(boxes_[box.half[0]].stale && boxes_[box.half[1]].stale, [&] { first = factor_within(box.half[0], forks - 1, assemble); },
+             [&] { second = factor_within(box.half[1], forks - 1, assemble); });
+    return first && second && factor_box(box, assemble, scratch);
+}
+
+bool GridFactor::factor(const Assemble& assemble) {
+    const bool good = factor_within(static_cast<int>(boxes_.size()) - 1, forks_, assemble);
+    if (!good) mark_all();
+    return good;
+}
+
+// Boxes within `top`, halves first.
+template <class Visit>
+void GridFactor::upward(int top, int forks, const Visit& visit) const {
+    const std::array<int, 2>& half = boxes_[top].half;
+    if (forks == 0 || half[0] < 0) {
+        for (int b = first_within(top); b <= top; ++b) visit(b);
+        return;
+    }
+    run_both(true, [&] { upward(half[0], forks - 1, visit); }, [&] { upward(half[1], forks - 1, visit); });
+    visit(top);
+}
+
+// Boxes within `top`, halves last.
+template <class Visit>
+void GridFactor::downward(int top, int forks, const Visit& visit) const {
+    const std::array<int, 2>& half = boxes_[top].half;
+    if (forks == 0 || half[0] < 0) {
+        for (int b = top; b >= first_within(top); --b) visit(b);
+        return;
+    }
+    visit(top);
+    run_both(true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
 }
 
 // One right side or many: single columns have quicker kernels.
 template <class Columns>
 void GridFactor::solve_columns(Columns x) const {
     using Part = Eigen::Matrix<double, Eigen::Dynamic, Columns::ColsAtCompileTime>;
-    Part at_border;
-    const auto visit_border = [&](const Box& box, auto visit) {
+    std::vector<Part> left(boxes_.size());  // [boxes][border x columns] what each leaves for the box that it is a half of
+    const int top = static_cast<int>(boxes_.size()) - 1;
+    upward(top, forks_, [&](int b) {
+        const Box& box = boxes_[b];
+        const int first = box.inner > 0 ? first_[box.nodes[0]] : 0;
+        left[b].setZero(box.border, x.cols());
+        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
+            const Box& half = boxes_[box.half[h]];
+            const Part& from = left[box.half[h]];
+            for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
+                const int row = half.offset[half.eliminated + k] - half.inner;
+                const int to = box.offset[box.slot[h][k]];
+                const int count = half.offset[half.eliminated + k + 1] - half.offset[half.eliminated + k];
+                if (to < box.inner) x.middleRows(first + to, count) += from.middleRows(row, count);
+                else left[b].middleRows(to - box.inner, count) += from.middleRows(row, count);
+            }
+        }
+        auto own = x.middleRows(first, box.inner);
+        if (own.isZero(0.0)) return;
+        box.factor.topRows(box.inner).template triangularView<Eigen::Lower>().solveInPlace(own);
+        left[b].noalias() -= box.factor.bottomRows(box.border) * own;
+    });
+    downward(top, forks_, [&](int b) {
+        const Box& box = boxes_[b];
+        if (box.inner == 0) return;
+        auto own = x.middleRows(first_[box.nodes[0]], box.inner);
+        Part& at_border = left[b];
         int row = 0;
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
-            for (int e = 0; e < count_[box.nodes[k]]; ++e) visit(row++, first_[box.nodes[k]] + e);
-    };
-    for (const Box& box : boxes_) {
-        if (box.inner == 0) continue;
-        auto own = x.middleRows(first_[box.nodes[0]], box.inner);
-        if (own.isZero(0.0)) continue;
-        box.factor.topRows(box.inner).template triangularView<Eigen::Lower>().solveInPlace(own);
-        at_border.noalias() = box.factor.bottomRows(box.border) * own;
-        visit_border(box, [&](int row, int equation) { x.row(equation) -= at_border.row(row); });
-    }
-    for (auto box = boxes_.rbegin(); box != boxes_.rend(); ++box) {
-        if (box->inner == 0) continue;
-        auto own = x.middleRows(first_[box->nodes[0]], box->inner);
-        at_border.resize(box->border, x.cols());
-        visit_border(*box, [&](int row, int equation) { at_border.row(row) = x.row(equation); });
-        own.noalias() -= box->factor.bottomRows(box->border).transpose() * at_border;
-        box->factor.topRows(box->inner).template triangularView<Eigen::Lower>().transpose().solveInPlace(own);
-    }
+            for (int e = 0; e < count_[box.nodes[k]]; ++e) at_border.row(row++) = x.row(first_[box.nodes[k]] + e);
+        own.noalias() -= box.factor.bottomRows(box.border).transpose() * at_border;
+        box.factor.topRows(box.inner).template triangularView<Eigen::Lower>().transpose().solveInPlace(own);
+    });
 }
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {

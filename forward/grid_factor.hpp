@@ -15,7 +15,8 @@ namespace crampfit {
 /// those that hold them: a general sparse factor would be made anew as a whole.
 class GridFactor {
   public:
-    GridFactor(int cells_x, int cells_y);
+    /// With several threads the parts of the tree go side by side, with the same bits.
+    GridFactor(int cells_x, int cells_y, int threads = 1);
 
     /// Place of each node in the elimination. Nodes are counted row by row, as cells are.
     const std::vector<int>& places() const { return place_; }
@@ -33,7 +34,7 @@ class GridFactor {
     void mark(int cell);
     void mark_all();
 
-    /// Adds the elements of a cell to a list.
+    /// Adds the elements of a cell to a list. Several threads may call it at a time.
     using Assemble = std::function<void(int cell, std::vector<Element>& elements)>;
 
     /// Factors anew what has changed. False when it is not positive definite.
@@ -55,6 +56,7 @@ class GridFactor {
         std::array<std::vector<int>, 2> slot;      // [halves][border nodes of the half] where they are in `nodes`
         bool stale = true;
 
+        std::vector<int> offset;                   // [nodes + 1] where the equations of each begin in the box's front
         int inner = 0;                             // equations eliminated here
         int border = 0;                            // equations at the border
         Eigen::MatrixXd factor;                    // [inner + border x inner] lower triangle, and what is below
@@ -62,13 +64,24 @@ class GridFactor {
         double least_pivot = 0, largest_pivot = 0;
     };
 
+    struct Scratch {                 // of one box
+        std::vector<int> local;      // [equations] place in its front
+        std::vector<Element> elements;
+    };
+
     int add_box(int i0, int i1, int j0, int j1);
     void place_nodes(Box& box, int i0, int i1, int j0, int j1);
-    const std::vector<int>& offsets(const Box& box);
-    void assemble_leaf(Box& box, const Assemble& assemble);
-    double* column_of(Box& box, int c);
-    void take_in(Box& box, int half);
-    bool eliminate(Box& box);
+    int first_within(int box) const;
+    bool factor_within(int box, int forks, const Assemble& assemble);
+    bool factor_box(Box& box, const Assemble& assemble, Scratch& scratch);
+    void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
+    static double* column_of(Box& box, int c);
+    void take_in(Box& box, int half) const;
+    static bool eliminate(Box& box);
+    template <class Visit>
+    void upward(int top, int forks, const Visit& visit) const;
+    template <class Visit>
+    void downward(int top, int forks, const Visit& visit) const;
     template <class Columns>
     void solve_columns(Columns x) const;
 
@@ -78,10 +91,7 @@ class GridFactor {
     std::vector<int> place_;         // [nodes]
     std::vector<int> box_of_cell_;   // its leaf
     std::vector<int> first_, count_; // [nodes] equations
-    // Scratch of one box:
-    std::vector<int> offset_;        // [nodes of the box + 1] where the equations of each begin in its front
-    std::vector<int> local_;         // [equations] place in its front
-    std::vector<Element> elements_;
+    int forks_ = 0;                  // levels of the tree at which its halves go side by side
 };
 
 } // namespace crampfit

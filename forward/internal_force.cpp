@@ -122,6 +122,58 @@ double InternalForce::visit_whole_cells(const std::vector<Vec2>& displacement, s
     }
 }
 
+template <int Count>
+Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const {
+    using Lane = Eigen::Array<double, Count, 1>;
+    const Points& points = body_.points;
+    const std::array<int, 4>& node = points.node[first];
+    std::array<Lane, 4> slope_x, slope_y;
+    std::array<Lane, 4> gradient;
+    gradient.fill(Lane::Zero());
+    for (int k = 0; k < 4; ++k) {
+        for (int i = 0; i < Count; ++i) {
+            const CellWeights& w = body_.weights[points.slot[first + i]];
+            slope_x[k][i] = w.slope_x[k];
+            slope_y[k][i] = w.slope_y[k];
+        }
+        if (!rotates_) continue;
+        const Vec2 u = displacement[node[k]];
+        gradient[0] += u.x() * slope_x[k];
+        gradient[1] += u.x() * slope_y[k];
+        gradient[2] += u.y() * slope_x[k];
+        gradient[3] += u.y() * slope_y[k];
+    }
+    const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
+    std::array<Lane, 6> C;
+    for (int k = 0; k < 6; ++k) C[k] = volume * Eigen::Map<const Lane>(&points.stiffness[k][first]);
+    const std::array<std::array<Lane, 4>, 4> A = elastic_tangent(gradient, C, rotates_, geometric);
+    Eigen::Matrix<double, 8, 8> sum;
+    for (int b = 0; b < 4; ++b) {
+        for (int k = 0; k < 2; ++k) {
+            std::array<Lane, 4> stress;  // per displacement
+            for (int i = 0; i < 4; ++i) stress[i] = slope_x[b] * A[i][2 * k] + slope_y[b] * A[i][2 * k + 1];
+            for (int a = b; a < 4; ++a) {
+                sum(2 * a, 2 * b + k) = (stress[0] * slope_x[a] + stress[1] * slope_y[a]).sum();
+                sum(2 * a + 1, 2 * b + k) = (stress[2] * slope_x[a] + stress[3] * slope_y[a]).sum();
+            }
+        }
+    }
+    for (int b = 1; b < 4; ++b)
+        for (int a = 0; a < b; ++a) sum.block<2, 2>(2 * a, 2 * b) = sum.block<2, 2>(2 * b, 2 * a).transpose();
+    return sum;
+}
+
+Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
+    switch (count) {
+        case 1: return tangent_of<1>(first, displacement, geometric);
+        case 4: return tangent_of<4>(first, displacement, geometric);
+        case 9: return tangent_of<9>(first, displacement, geometric);
+        case 16: return tangent_of<16>(first, displacement, geometric);
+        case 25: return tangent_of<25>(first, displacement, geometric);
+        default: return tangent(first, 1, displacement, geometric) + tangent(first + 1, count - 1, displacement, geometric);
+    }
+}
+
 void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
     visit_whole_cells(displacement, &force);
     const Points& points = body_.points;

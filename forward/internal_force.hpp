@@ -26,6 +26,10 @@ class InternalForce {
 
     void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
 
+    /// Second derivative of the energy of points that follow each other on the same fields, by these fields' displacements [N/m];
+    /// `geometric` as in `elastic_tangent`.
+    Eigen::Matrix<double, 8, 8> tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
+
     struct Alone {
         int point;
         double stiffness;  // k, the mean of both directions, so that it does not feel rotation [N/m]
@@ -44,6 +48,8 @@ class InternalForce {
     template <int PointsPerCell, bool Rotates>
     double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     double visit_whole_cells(const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    template <int Count>
+    Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
     const Discretisation& body_;
     bool rotates_;

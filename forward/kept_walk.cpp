@@ -9,20 +9,16 @@
 
 namespace crampfit {
 
-KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers)
-    : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers) {
-    int tips = 0;
-    for (const Crack& crack : scene_.cracks) tips += crack.grows == Growth::both ? 2 : crack.grows != Growth::none;
-    reusable_ = plan_.quasistatic && tips <= 1;
-    has_slopes_ = reusable_;
-    for (const Crack& crack : scene_.cracks) has_slopes_ = has_slopes_ && (crack.grows == Growth::none || crack.advance > 0.0);
-    if (!has_slopes_) numbers_.clear();
+KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, int threads)
+    : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers), threads_(threads) {
+    reusable_ = plan_.quasistatic && growing_tips(scene_) <= 1;
+    if (!has_slopes()) numbers_.clear();
 }
 
-Record KeptWalk::run(const Scene& scene, const SimulateOptions& options) {
+Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool rough) {
     const auto start = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
-    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, numbers_);
+    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, numbers_, threads_);
     const int known = walk_->equilibria();
     std::vector<double> by;
     for (const std::string& key : numbers_) {
@@ -30,6 +26,7 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options) {
         const double to = get_number(scene, key);
         by.push_back(from > 0.0 && to > 0.0 ? from * std::log(to / from) : to - from);
     }
+    walk_->set_rough(rough);
     walk_->shift(by);
     Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) {
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));

@@ -16,26 +16,27 @@ class KeptWalk {
   public:
     /// `numbers`: keys of numbers of the materials, other than toughness, by which derivatives are wanted. Throws InputError as
     /// `simulate` does.
-    explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {});
+    /// Equations are solved by `threads` threads.
+    explicit KeptWalk(const Scene& scene, const std::vector<std::string>& numbers = {}, int threads = 1);
 
-    /// False where a tip's own G says when the crack moves (`advance` 0): its derivatives are not to be had.
-    bool has_slopes() const { return has_slopes_; }
+    /// False where it is not reusable: derivatives are those on the way of the crack as it is.
+    bool has_slopes() const { return reusable_; }
 
     /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
     bool reusable() const { return reusable_; }
 
-    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. Probes
-    /// are solved for, and read as for the first scene's numbers. One run at a
+    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
+    /// with the equilibria that are known, where it can. Probes are solved for, and read as for the first scene's numbers. One run at a
     /// time: others wait.
-    Record run(const Scene& scene, const SimulateOptions& options);
+    Record run(const Scene& scene, const SimulateOptions& options, bool rough = false);
 
   private:
     Scene scene_;
     MaterialMap materials_;
     Plan plan_;
     std::vector<std::string> numbers_;
+    int threads_ = 1;
     bool reusable_ = false;
-    bool has_slopes_ = false;
     std::mutex mutex_;
     std::unique_ptr<Quasistatic> walk_;
 };

@@ -39,6 +39,8 @@ MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const D
     }
 }
 
+const MaterialMap& MaterialSlope::materials(bool more) const { return (more ? more_ : less_)->materials; }
+
 double MaterialSlope::opening_modulus(const Vec2& centre, const Vec2& half, const Vec2& along) const {
     const auto of = [&](const Shifted& s) { return crampfit::opening_modulus(s.materials, centre, half, along); };
     return (of(*more_) - of(*less_)) / (2.0 * step_);

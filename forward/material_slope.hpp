@@ -19,6 +19,10 @@ class MaterialSlope {
     /// Stiffness of a cell's points [Pa / the number's unit].
     const Eigen::Matrix3d& stiffness(int cell) const { return stiffness_[cell]; }
 
+    /// The map with the number more or less by `step`.
+    const MaterialMap& materials(bool more) const;
+    double step() const { return step_; }
+
     /// Of `opening_modulus`.
     double opening_modulus(const Vec2& centre, const Vec2& half, const Vec2& along) const;
 

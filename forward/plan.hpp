@@ -33,6 +33,9 @@ struct Plan {
 /// Checks that a solver here can do what is asked, and decides. Throws InputError naming the key that it cannot honour.
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body);
 
+/// How many crack tips may grow.
+int growing_tips(const Scene& scene);
+
 std::string describe(const Scene& scene, const Plan& plan, const Discretisation& body);
 
 } // namespace crampfit

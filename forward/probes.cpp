@@ -30,38 +30,64 @@ ProbeReading read_probes(const std::vector<Vec2>& places, const Discretisation& 
     return reading;
 }
 
-Instant instant_at(const std::vector<Instant>& series, double at, bool by_displacement) {
-    const auto place = [&](const Instant& row) { return by_displacement ? row.displacement : row.time; };
-    const auto after = std::find_if(series.begin(), series.end(), [&](const Instant& row) { return place(row) >= at; });
-    if (after == series.end()) return series.back();
-    if (after == series.begin()) return series.front();
+SeriesPlace place_in(const std::vector<Instant>& series, double at, bool by_displacement) {
+    const auto value = [&](const Instant& row) { return by_displacement ? row.displacement : row.time; };
+    const auto after = std::find_if(series.begin(), series.end(), [&](const Instant& row) { return value(row) >= at; });
+    if (after == series.end()) return {series.size() - 1, 0.0};
+    if (after == series.begin()) return {};
     const Instant& before = *std::prev(after);
-    const double s = (at - place(before)) / (place(*after) - place(before));
-    Instant instant = before;
-    instant.time = std::lerp(before.time, after->time, s);
-    instant.displacement = std::lerp(before.displacement, after->displacement, s);
-    instant.crack_length = std::lerp(before.crack_length, after->crack_length, s);
-    instant.tip = before.tip + s * (after->tip - before.tip);
-    return instant;
+    return {static_cast<std::size_t>(after - series.begin()) - 1, (at - value(before)) / (value(*after) - value(before))};
 }
 
 Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk)
-    : walk_(walk), body_(scene, materials), equilibrium_(scene, plan, materials, body_), tracked_(tracked_tip(scene)) {}
+    : walk_(walk), body_(scene, materials), equilibrium_(scene, plan, materials, body_) {}
 
-void Revisit::grow(const Vec2& to, int crack, bool at_end) {
-    const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
-    if (tip.inside && (to - tip.position).norm() > 1e-6 * body_.layout.cell.minCoeff()) equilibrium_.grow(crack, at_end, to);
+namespace {
+
+// Length of a crack of the scene at a row of the series [m].
+double length_at(const Record& record, int crack, std::size_t row) {
+    if (crack == record.tracked_crack) return record.series[row].crack_length;
+    return record.cracks[crack - (crack > record.tracked_crack)].length[row];
 }
 
-bool Revisit::to(const Instant& instant) {
-    const double length = instant.crack_length * (1.0 + 1e-9);
-    while (tracked_.crack >= 0 && !walk_.station(station_).left && walk_.reach(station_ + 1, instant.time) &&
-           walk_.station(station_ + 1).lengths[tracked_.crack] <= length) {
-        const Station& from = walk_.station(station_++);
-        grow(walk_.station(station_).tips[from.crack][from.at_end], from.crack, from.at_end);
+std::size_t next_row(const Record& record, const SeriesPlace& place) { return std::min(place.row + 1, record.series.size() - 1); }
+
+double time_at(const Record& record, const SeriesPlace& place) {
+    return std::lerp(record.series[place.row].time, record.series[next_row(record, place)].time, place.share);
+}
+
+} // namespace
+
+// Moves the tips that move on from the station by this share of the way to the next.
+void Revisit::grow(double share) {
+    for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
+        const Vec2& start = walk_.station(station_).tips[crack][at_end];
+        const Vec2 to = start + share * (walk_.station(station_ + 1).tips[crack][at_end] - start);
+        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
+        if (tip.inside && (to - tip.position).norm() > 1e-6 * body_.layout.cell.minCoeff()) equilibrium_.grow(crack, at_end, to);
     }
-    if (tracked_.crack >= 0) grow(instant.tip, tracked_.crack, tracked_.at_end);
-    return equilibrium_.solve(instant.time) == Equilibrium::Outcome::solved;
+}
+
+// How much of the way from the station to the next the cracks have gone.
+double Revisit::share_gone(const Record& record, const SeriesPlace& place) {
+    if (walk_.station(station_).left || !walk_.reach(station_ + 1, time_at(record, place))) return 0.0;
+    double least = 1.0;
+    for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
+        const double length = std::lerp(length_at(record, crack, place.row), length_at(record, crack, next_row(record, place)), place.share);
+        const double here = walk_.station(station_).lengths[crack];
+        const double grown = walk_.station(station_ + 1).lengths[crack] - here;
+        if (length < here + grown) least = std::min(least, std::max(0.0, (length - here) / grown));
+    }
+    return least > 1.0 - 1e-9 ? 1.0 : least;
+}
+
+bool Revisit::to(const Record& record, const SeriesPlace& place) {
+    while (share_gone(record, place) == 1.0) {
+        grow(1.0);
+        ++station_;
+    }
+    if (const double share = share_gone(record, place); share > 0.0) grow(share);
+    return equilibrium_.solve(time_at(record, place)) == Equilibrium::Outcome::solved;
 }
 
 namespace {
@@ -110,10 +136,10 @@ void read_probes(const Scene& scene, const Plan& plan, const MaterialMap& materi
     std::optional<WideRevisit> wide;
     if (plan.extrapolates) wide.emplace(scene, plan, walk);
     for (const double at : probes.instants) {
-        const Instant instant = instant_at(record.series, at, probes.by_displacement);
-        if (!revisit.to(instant)) return;
+        const SeriesPlace place = place_in(record.series, at, probes.by_displacement);
+        if (!revisit.to(record, place)) return;
         ProbeReading& reading = record.probes.emplace_back(read_probes(probes.places, revisit));
-        if (wide && wide->revisit.to(instant))
+        if (wide && wide->revisit.to(record, place))
             extrapolate(reading, read_probes(probes.places, wide->revisit), probes.places, wide->revisit.body().layout.cell.maxCoeff());
     }
 }

@@ -2,7 +2,6 @@
 
 #include "datasets/record.hpp"
 #include "forward/quasistatic.hpp"
-#include "forward/recorder.hpp"
 
 namespace crampfit {
 
@@ -11,30 +10,35 @@ namespace crampfit {
 ProbeReading read_probes(const std::vector<Vec2>& places, const Discretisation& body, const CrackFields& cracks,
                          const std::vector<Vec2>& displacement);
 
-/// The row of a record's series at a time [s], or at a displacement [m] where it is first reached: linear between rows, the last row after
-/// the end.
-Instant instant_at(const std::vector<Instant>& series, double at, bool by_displacement);
+/// A place between a row of a record's series and the next.
+struct SeriesPlace {
+    std::size_t row = 0;
+    double share = 0;  // of the way to the next row, 0..1
+};
+
+/// Where a series comes to a time [s], or first to a displacement [m]; its last row where it ends before.
+SeriesPlace place_in(const std::vector<Instant>& series, double at, bool by_displacement);
 
 /// The equilibria of a walk that a record has rows of. A walk keeps no displacements: each is solved for anew, with the cracks as they
 /// were then.
 class Revisit {
   public:
-    /// All of them must outlive this.
+    /// All of them must outlive this. The scene's cells may be others than the walk's.
     Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk);
 
-    /// Goes to an instant, no earlier than the last one. False where there is no equilibrium.
-    bool to(const Instant& instant);
+    /// Goes to a place of the walk's record, no earlier than the last one. False where there is no equilibrium.
+    bool to(const Record& record, const SeriesPlace& place);
 
     const Discretisation& body() const { return body_; }
     const Equilibrium& equilibrium() const { return equilibrium_; }
 
   private:
-    void grow(const Vec2& to, int crack, bool at_end);
+    double share_gone(const Record& record, const SeriesPlace& place);
+    void grow(double share);
 
     Quasistatic& walk_;
     Discretisation body_;
     Equilibrium equilibrium_;
-    TrackedTip tracked_;
     std::size_t station_ = 0;
 };
 

@@ -1,7 +1,6 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
-#include "forward/growth.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +9,6 @@
 namespace crampfit {
 
 namespace {
-
-constexpr double never = std::numeric_limits<double>::infinity();
 
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
@@ -25,11 +22,11 @@ constexpr int loading_steps = 32;
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
+// So many places back are asked what the load does there.
+constexpr int farthest_back = 3;
+
 // Part by which the change of the potential over a loading step may differ from the load's work by its ends (trapezoid rule).
 constexpr double most_disagreement = 0.1;
-
-// G at the tip over toughness below which a crack is not about to move.
-constexpr double far_below = 0.3;
 
 Scene with_wide_cells(Scene scene) {
     scene.model.cell *= 2.0;
@@ -43,67 +40,45 @@ struct Quasistatic::Coarse {
     MaterialMap materials;
     Quasistatic walk;
 
-    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, &leader) {}
+    Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader) {}
 };
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers)
-    : Quasistatic(scene, plan, materials, numbers, nullptr) {
-    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, *this);
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+                         int threads)
+    : Quasistatic(scene, plan, materials, numbers, threads, nullptr) {
+    if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
-                         const Quasistatic* leader)
+                         int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_) {
+      equilibrium_(scene, plan, materials, body_, threads) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
     const double cell = body_.layout.cell.minCoeff();
-    increment_ = increment_in_cells * cell;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
-        if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.emplace_back(k, false);
-        if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.emplace_back(k, true);
-        if (crack.grows == Growth::none || crack.advance == 0.0) continue;
-        ahead_ = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
-        increment_ = crack.advance / static_cast<double>(ahead_);
+        std::size_t ahead = 0;
+        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
+        if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
+        if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
     }
-    add_place();
+    way_.push_back(add_place(-1, 0u));
     if (leader && plan.linear) know_linear(0);
 }
 
 Quasistatic::~Quasistatic() = default;
 
-// The equilibrium stands at a new place of the crack.
-void Quasistatic::add_place() {
-    Place& place = places_.emplace_back();
-    Station& station = place.station;
-    station.thickness = body_.layout.thickness;
-    station.linear = plan_.linear;
-    station.still_from = plan_.still_from;
-    station.left = true;
-    station.grows = !growing_.empty();
-    for (const CrackLine& line : equilibrium_.cracks().lines) {
-        station.tips.push_back({line.start.position, line.end.position});
-        station.lengths.push_back(line.length);
-    }
-    for (const auto& [crack, at_end] : growing_) {
-        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
-        station.left = false;
-        station.crack = crack;
-        station.at_end = at_end;
-    }
-    if (!plan_.linear) place.snapshot = equilibrium_.save();
-    entered_ = &place;
-}
+Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nullptr; }
 
-void Quasistatic::enter(const Place& place) {
-    if (entered_ == &place) return;
-    equilibrium_.restore(*place.snapshot);
-    entered_ = &place;
+bool Quasistatic::fail() {
+    failure_ = "no equilibrium was found";
+    return false;
 }
 
 LoadState Quasistatic::load_state() const {
@@ -155,15 +130,23 @@ std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
     if (motions.empty()) return std::nullopt;
     const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
     if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
-    const Eigen::MatrixXd slope = equilibrium_.slopes(numbers_, motions);
+    const Equilibrium::Slopes slope = equilibrium_.slopes(numbers_);
     std::vector<LoadState> found(numbers_.size());
-    for (std::size_t n = 0; n < numbers_.size(); ++n) {
-        found[n].potential = slope(0, n);
-        found[n].power = slope(1, n);
+    for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
+        found[n].potential = slope.potential[n];
+        found[n].power = slope.along(motions[0], n);
         found[n].reactions.assign(boundary.drivers(), Vec2::Zero());
-        found[n].reactions[gauges.force] = slope(2, n) * gauges.force_direction;
-        if (!pulled.empty()) found[n].displacement = -slope(3, n);
+        found[n].reactions[gauges.force] = slope.along(motions[1], n) * gauges.force_direction;
+        if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
+    }
+    // A tip's own G counts where that says when it moves.
+    std::vector<std::vector<Vec2>> moved;
+    for (const GrowingTip& tip : growing_) {
+        if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
+        if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
+        for (std::size_t n = 0; n < numbers_.size(); ++n)
+            found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
     }
     return found;
 }
@@ -186,6 +169,7 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
     move(state.displacement, [](const LoadState& s) { return s.displacement; });
     for (std::size_t d = 0; d < state.reactions.size(); ++d)
         for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
+    for (std::size_t k = 0; k < state.tips.size(); ++k) move(state.tips[k].G, [&](const LoadState& s) { return s.tips[k].G; });
     place.station.states[time] = std::move(state);
 }
 
@@ -195,6 +179,7 @@ void Quasistatic::shift(const std::vector<double>& by) {
     if (shift_ == before) return;
     for (Place& place : places_) {
         place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
+        place.guessed.clear();
         place.station.ahead.clear();
     }
     if (shift_.empty()) return;
@@ -204,7 +189,7 @@ void Quasistatic::shift(const std::vector<double>& by) {
 
 // In a linear scene no load and full load say all; the state half way is between them.
 bool Quasistatic::know_linear(std::size_t number) {
-    if (coarse_ && !coarse_->walk.reach(number, 0.0)) return false;
+    if (coarse_ && !coarse_->walk.follow_leader(number)) return false;
     const auto solve = [&](int time) {
         ++equilibria_;
         return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
@@ -247,8 +232,7 @@ bool Quasistatic::know_linear(std::size_t number) {
 // Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
 // asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
 // when a crack has grown at the same time it falls.
-bool Quasistatic::solve_from(double potential, double power, double time) {
-    const double from = equilibrium_.time();
+bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
     if (equilibrium_.solve(time) != Equilibrium::Outcome::solved) return false;
     const double change = equilibrium_.potential() - potential;
@@ -259,19 +243,51 @@ bool Quasistatic::solve_from(double potential, double power, double time) {
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
+// A displacement of a place, on the fields of one that follows it.
+std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& before, int to) const {
+    if (to == from) return before;
+    std::vector<Vec2> displacement = handed_on(from, before, places_[to].parent);
+    for (const auto& [added, source] : places_[to].new_fields) displacement.push_back(displacement[source]);
+    return displacement;
+}
+
+// From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
+// nearest of these has gone between the two times.
+bool Quasistatic::solve_predicted(std::size_t number, int time) {
+    int before = places_[number].parent;
+    for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back) before = back < farthest_back ? places_[before].parent : -1;
+    if (before < 0) return false;
+    const std::map<int, Known>& there = places_[before].known;
+    const Known* from = nullptr;
+    for (const auto& [t, known] : places_[number].known)
+        if (there.count(t) && (!from || std::abs(t - time) < std::abs(from->time - time))) from = &known;
+    if (!from || from->time == 0) return false;
+    std::vector<Vec2> gone = there.at(time).displacement;
+    const std::vector<Vec2>& start = there.at(from->time).displacement;
+    for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
+    std::vector<Vec2> predicted = handed_on(before, gone, static_cast<int>(number));
+    for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
+    equilibrium_.set_displacements(predicted, time_of(time));
+    return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
+}
+
 // Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
-bool Quasistatic::solve_for(Place& place, int time) {
+bool Quasistatic::solve_for(std::size_t number, int time) {
+    Place& place = places_[number];
     enter(place);
+    if (solve_predicted(number, time)) return true;
     const std::vector<Vec2> unloaded(equilibrium_.displacements().size(), Vec2::Zero());
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
-    for (const auto* all : {&place.known, &place.guess}) {
-        for (const auto& [number, known] : *all) {
-            if (std::abs(number - time) >= nearest) continue;
-            nearest = std::abs(number - time);
-            from = known;
-        }
-    }
+    const auto consider = [&](const Known& known, bool before) {
+        if (std::abs(known.time - time) >= nearest) return;
+        nearest = std::abs(known.time - time);
+        from = known;
+        if (before) from.displacement = handed_on(place.parent, known.displacement, static_cast<int>(number));
+    };
+    for (const auto& [t, known] : place.known) consider(known, false);
+    if (place.parent >= 0)
+        for (const auto& [t, known] : places_[place.parent].known) consider(known, true);
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time));
@@ -279,12 +295,12 @@ bool Quasistatic::solve_for(Place& place, int time) {
         double power = from.power;
         bool good = true;
         if (from.time != time && !place.known.count(from.time) && std::isfinite(from.potential)) {  // growth first, then more load
-            good = solve_from(potential, power, time_of(from.time));
+            good = solve_from(potential, power, time_of(from.time), time_of(from.time));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
         for (int part = 1; part <= parts && good; ++part) {
-            good = solve_from(potential, power, std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            good = solve_from(potential, power, equilibrium_.time(), std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
@@ -300,9 +316,47 @@ bool Quasistatic::solve_for(Place& place, int time) {
 
 // Knows the state of a place at a time, as the shift has it.
 bool Quasistatic::know(std::size_t number, int time) {
-    if (places_[number].station.states.count(time)) return true;
+    return places_[number].station.states.count(time) || (rough_ && guess(number, time)) || know_exactly(number, time);
+}
+
+bool Quasistatic::know_exactly(std::size_t number, int time) {
     if (!places_[number].states.count(time) && !find(number, time)) return false;
+    places_[number].guessed.erase(time);
     return shift_.empty() || know_slopes(number, time);
+}
+
+// From the states of a place about a time; beyond them as the nearest one goes: its energy as a power of the time.
+bool Quasistatic::guess(std::size_t number, int time) {
+    Place& place = places_[number];
+    const LoadState* before = nullptr;
+    const LoadState* after = nullptr;
+    for (const auto& [known, state] : place.states) {
+        if (known == 0) continue;
+        if (!place.station.states.count(known) && !know_slopes(number, known)) return false;
+        const LoadState& shown = place.station.states.at(known);
+        if (known <= time) before = &shown;
+        else if (!after) after = &shown;
+    }
+    if (!before && !after) return false;
+    if (place.station.states.count(time)) return true;
+    const LoadState* nearest = before ? before : after;
+    const LoadState found = before && after ? between(*before, *after, time_of(time)) : nearest->gone_on(time_of(time));
+    place.station.states[time] = found;
+    place.guessed.insert(time);
+    return true;
+}
+
+void Quasistatic::set_rough(bool rough) {
+    if (rough_ && !rough) forget_guesses();
+    rough_ = rough;
+}
+
+void Quasistatic::forget_guesses() {
+    for (Place& place : places_) {
+        for (const int time : place.guessed) place.station.states.erase(time);
+        place.guessed.clear();
+        place.station.ahead.clear();
+    }
 }
 
 bool Quasistatic::know_slopes(std::size_t number, int time) {
@@ -325,14 +379,14 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
-    if (coarse_ && !(coarse_->walk.reach(number, 0.0) && coarse_->walk.know(number, time))) return false;
+    if (coarse_ && !(coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time))) return false;
     if (time == 0 && equilibrium_.boundary().tractions.empty()) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
         keep(number, 0, nothing(0.0));
         return true;
     }
-    if (solve_for(place, time)) {
+    if (solve_for(number, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power()};
         keep(number, time, load_state());
         return true;
@@ -345,136 +399,20 @@ bool Quasistatic::find(std::size_t number, int time) {
 // Knows a place, and the one an advance further, at a time.
 bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(number, time)) return false;
-    Station& station = places_[number].station;
-    if (station.crack < 0 || station.route.size() < 2) return true;
-    const std::size_t further = std::min(number + ahead_, places_.size() - 1);
-    if (!plan_.linear && !know(further, time)) return false;
-    const LoadState& state = places_[further].station.states.at(time);
-    station.ahead[time] = {state.potential, state.power};
+    Place& place = places_[number];
+    if (place.station.moving.empty() || place.station.moving.front().route.size() < 2) return true;
+    if (!plan_.linear && !know(place.further, time)) return false;
+    const LoadState& state = places_[place.further].station.states.at(time);
+    place.station.ahead[time] = {state.potential, state.power};
     return true;
 }
 
-Vec2 Quasistatic::next_tip(const Place& last, const TipLoad& load) const {
-    const Station& station = last.station;
-    if (leader_) return leader_->places_[places_.size()].station.tips[station.crack][station.at_end];
-    const CrackTip& tip = equilibrium_.cracks().lines[station.crack].tip(station.at_end);
-    return tip.position + increment_ * growth_direction(scene_.cracks[station.crack].direction, tip, load, materials_, increment_);
-}
-
-// Grows the crack from the last place to the next one.
-bool Quasistatic::extend(double now) {
-    Place& last = places_.back();
-    Station& station = last.station;
-    if (station.left) return false;
-    int time = last_time_;
-    if (leader_) {
-        station.crack = leader_->places_[places_.size() - 1].station.crack;
-        station.at_end = leader_->places_[places_.size() - 1].station.at_end;
-        enter(last);
-    } else if (!plan_.linear) {
-        time = std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
-        if (!know(places_.size() - 1, time)) return false;
-        enter(last);
-        equilibrium_.set_displacements(last.known.at(time).displacement, time_of(time));
-    }
-    const TipLoad load = leader_ ? TipLoad{} : station.states.at(time).tips[2 * station.crack + station.at_end];
-    const auto fields = equilibrium_.grow(station.crack, station.at_end, next_tip(last, load));
-    std::map<int, Known> guess = last.known;
-    for (auto& [time_there, known] : guess)
-        for (const auto& [added, from] : fields) known.displacement.push_back(known.displacement[from]);
-    add_place();
-    places_.back().guess = std::move(guess);
-    return !plan_.linear || know_linear(places_.size() - 1);
-}
-
-bool Quasistatic::reach(std::size_t station, double now) {
-    while (places_.size() <= station + (leader_ ? 0 : ahead_) && !places_.back().station.left) {
-        if (leader_ && places_.size() >= leader_->places_.size()) break;
-        if (extend(now)) continue;
-        failure_ = "no equilibrium was found";
-        break;
-    }
-    if (station >= places_.size()) return false;
-    find_route(station);
-    return true;
-}
-
-void Quasistatic::find_route(std::size_t number) {
-    Station& station = places_[number].station;
-    if (station.crack < 0 || leader_) return;
-    station.route = {station.tips[station.crack][station.at_end]};
-    for (std::size_t k = number + 1; k <= number + ahead_ && k < places_.size(); ++k) {
-        const Vec2& tip = places_[k].station.tips[station.crack][station.at_end];
-        if (tip != station.route.back()) station.route.push_back(tip);
-    }
-}
-
-// Of several tips the one moves that reaches its toughness first.
-void Quasistatic::choose_tip(Station& station, const MaterialMap& materials) const {
-    double first = never;
-    Station trial = station;
-    for (const auto& [crack, at_end] : growing_) {
-        if (!equilibrium_.cracks().lines[crack].tip(at_end).inside) continue;
-        trial.crack = crack;
-        trial.at_end = at_end;
-        trial.route = {station.tips[crack][at_end]};
-        const double time = trial.critical_time(mean_toughness(materials, trial.route));
-        if (time >= first) continue;
-        first = time;
-        station.crack = crack;
-        station.at_end = at_end;
-        station.route = trial.route;
-    }
-}
-
-Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now) {
-    Station& station = places_[number].station;
-    if (station.left || station.crack < 0) return {};
-    const auto judge = [&]() -> Critical {
-        if (growing_.size() > 1) choose_tip(station, materials);
-        const double toughness = mean_toughness(materials, station.route);
-        return {station.critical_time(toughness), toughness};
-    };
-    const auto fail = [&]() -> Critical {
-        failure_ = "no equilibrium was found";
-        return {};
-    };
-    if (plan_.linear) {
-        for (const int time : {0, 1, 2}) know_ahead(number, time);
-        return judge();
-    }
-    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
-    int high = low + 1;
-    // As long as G at the tip is this far below the toughness, what lies ahead is not asked for; were the next advance to release
-    // more all the same, that shows later, and what is missing is found then.
-    const auto far_from_critical = [&](int time) {
-        if (growing_.size() > 1 || !know(number, time)) return false;
-        const double toughness = mean_toughness(materials, station.route);
-        return station.states.at(time).tips[2 * station.crack + station.at_end].G < far_below * toughness;
-    };
-    while (high < last_time_ && far_from_critical(high)) low = high++;
-    while (true) {
-        if (!know_ahead(number, low) || !know_ahead(number, high)) return fail();
-        const Critical found = judge();
-        if (!std::isfinite(found.time)) {
-            if (high >= last_time_) return found;
-            low = high++;
-            continue;
-        }
-        // Good where it lies between two states that stand next to each other, or where it has been due before.
-        const int before = static_cast<int>(found.time / time_step_);
-        if (found.time <= now || before >= last_time_) return found;
-        if (station.ahead_known(before) && station.ahead_known(before + 1)) return found;
-        low = std::max(0, before);
-        high = low + 1;
-    }
-}
-
-LoadState Quasistatic::at(std::size_t number, double time) {
+LoadState Quasistatic::at(std::size_t station_number, double time) {
+    const int number = way_[station_number];
     const Station& station = places_[number].station;
     if (!plan_.linear) {
         const int low = std::clamp(static_cast<int>(time / time_step_), 0, last_time_ - 1);
-        if (!know(number, low) || !know(number, low + 1)) failure_ = "no equilibrium was found";
+        if (!know(number, low) || !know(number, low + 1)) fail();
     }
     return station.states.empty() ? nothing(time) : station.at(time);
 }

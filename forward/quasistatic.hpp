@@ -8,13 +8,17 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace crampfit {
 
-/// The way of a crack through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
+/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
 /// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
 /// crack took when it was first followed, so that other toughnesses find most of what they need here.
+///
+/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing tells
+/// apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
 ///
 /// In a linear scene three states say all about a station. Else equilibria are known at even times, and between them by
 /// interpolation.
@@ -25,19 +29,24 @@ class Quasistatic {
   public:
     /// `scene`, `plan` and `materials` must outlive this.
     /// `numbers`: keys of numbers of the materials by which derivatives are wanted.
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {});
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {},
+                int threads = 1);
     ~Quasistatic();
 
     /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
     /// of each number.
     void shift(const std::vector<double>& by);
 
-    /// Follows the crack to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
-    /// has reached a free surface, or there is no equilibrium. `now` is how far the load has come [s].
+    /// From now on states that are not known need not be found where others of the same place are: they follow from these, roughly.
+    void set_rough(bool rough);
+
+    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
+    /// has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which one
+    /// moves. `now` is how far the load has come [s].
     bool reach(std::size_t station, double now);
 
     /// The station, with all its states that have been asked for. It must have been reached.
-    const Station& station(std::size_t number) const { return places_[number].station; }
+    const Station& station(std::size_t number) const { return places_[way_[number]].station; }
 
     /// The load at which the crack moves on from a station.
     struct Critical {
@@ -62,26 +71,52 @@ class Quasistatic {
         double potential;                               // [J]
         double power;                                   // [W]
     };
-    struct Place {
+    struct GrowingTip {
+        int crack;
+        bool at_end;
+        double increment;                               // of its crack's length between stations [m]
+        std::size_t ahead;                              // stations that an advance spans
+    };
+    struct Place {                                      // of all tips: on the way, or tried
         Station station;
-        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene
+        int parent = -1;
+        unsigned moved = 0;                             // tips that have gone on since the parent, a bit each
+        unsigned inside = 0;                            // growing tips that can go on from here
+        unsigned tips = 0;                              // those of the station's `moving`
+        int further = -1;                               // the place where they have gone an advance on
+        std::map<unsigned, int> next;                   // places by the tips that have gone on from here
+        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene with a single tip
         std::map<int, Known> known;                     // by number of the time
-        std::map<int, Known> guess;                     // the same of the place before, handed on
+        std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, std::vector<LoadState>> slopes;   // [numbers] their derivatives
+        std::set<int> guessed;                          // times at which the station's state is no more than roughly known
     };
 
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers, int threads,
                 const Quasistatic* leader);
-    void add_place();
-    bool extend(double now);
-    void find_route(std::size_t number);
-    Vec2 next_tip(const Place& last, const TipLoad& load) const;
+    int add_place(int parent, unsigned moved);
+    int next(int number, unsigned tips, double now);
+    Vec2 next_tip(const GrowingTip& growing, const LoadState* state) const;
+    bool follow_leader(std::size_t place);
+    bool let_move(int number, unsigned tips, double now);
+    void keep_only_from(int number);
+    std::vector<unsigned> fronts(int number, const MaterialMap& materials, int time) const;
+    double drive(int number, const GrowingTip& tip, int time) const;
+    Critical critical_of_front(int number, const MaterialMap& materials, double now, double until);
+    int time_from(double now) const;
+    bool fail();
+    Quasistatic* coarse() const;
     bool know(std::size_t number, int time);
+    bool know_exactly(std::size_t number, int time);
+    bool guess(std::size_t number, int time);
+    void forget_guesses();
     bool find(std::size_t number, int time);
     bool know_linear(std::size_t number);
-    bool solve_for(Place& place, int time);
-    bool solve_from(double potential, double power, double time);
+    bool solve_for(std::size_t number, int time);
+    bool solve_predicted(std::size_t number, int time);
+    std::vector<Vec2> handed_on(int from, const std::vector<Vec2>& before, int to) const;
+    bool solve_from(double potential, double power, double from, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);
     void keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes);
@@ -91,7 +126,6 @@ class Quasistatic {
     void enter(const Place& place);
     LoadState load_state() const;
     LoadState nothing(double time) const;
-    void choose_tip(Station& station, const MaterialMap& materials) const;
     double time_of(int number) const { return number * time_step_; }
 
     const Scene& scene_;
@@ -102,11 +136,12 @@ class Quasistatic {
     Equilibrium equilibrium_;
     std::vector<MaterialSlope> numbers_;
     std::vector<double> shift_;                   // [numbers]; empty: none
-    std::deque<Place> places_;
+    std::deque<Place> places_;                    // parents first
+    bool rough_ = false;
     const Place* entered_ = nullptr;              // the one that the equilibrium stands at
-    std::vector<std::pair<int, bool>> growing_;   // tips: crack, at its end
-    double increment_ = 0;                        // of the crack length between stations [m]
-    std::size_t ahead_ = 0;                       // stations that an advance spans
+    std::vector<GrowingTip> growing_;
+    std::vector<int> way_;                        // [stations] places
+    std::map<unsigned, double> tried_;            // by front: its critical time when it was tried last, times `drive` then
     double time_step_ = 0;                        // between two times at which equilibria are known [s]
     int last_time_ = 0;                           // number of the last of them
     std::string failure_;

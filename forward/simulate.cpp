@@ -55,7 +55,7 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     const TrackedTip tracked = tracked_tip(scene);
     for (int k = 0; k < scene.output.frames; ++k) {
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
-        if (!revisit.to(instant)) return;
+        if (!revisit.to(record, {static_cast<std::size_t>(&instant - record.series.data()), 0.0})) return;
         record.frames.push_back(make_frame(scene, plan, revisit.body(), revisit.equilibrium().displacements()));
         Frame& frame = record.frames.back();
         frame.time = instant.time;
@@ -65,7 +65,7 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
 }
 
 Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const SimulateOptions& options) {
-    Quasistatic walk(scene, plan, materials);
+    Quasistatic walk(scene, plan, materials, {}, options.threads);
     const auto go_on = [&](double time, double crack_length) {
         if (options.progress) {
             const double by_time = time / plan.end_time;
@@ -98,7 +98,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
             break;
         }
         if (plan.grows && all_growing_tips_left(scene, solver)) {
-            recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface");
+            recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface or another crack");
             break;
         }
         if (options.stop_requested && options.stop_requested->load(std::memory_order_relaxed)) {

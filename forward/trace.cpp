@@ -87,9 +87,12 @@ class Tracer {
         if (i > 0) {
             const Station& before = walk_.station(i - 1);
             const Station& here = walk_.station(i);
-            const double grown = here.lengths[before.crack] - before.lengths[before.crack];
-            spent += grown * here.thickness *
-                     mean_toughness(materials_, {before.tips[before.crack][before.at_end], here.tips[before.crack][before.at_end]});
+            for (const auto& [crack, at_end, route] : before.moving) {
+                const auto same = [k = crack](const MovingTip& tip) { return tip.crack == k; };
+                const auto ends = std::count_if(before.moving.begin(), before.moving.end(), same);  // that share what the crack has grown
+                const double grown = (here.lengths[crack] - before.lengths[crack]) / static_cast<double>(ends);
+                spent += grown * here.thickness * mean_toughness(materials_, {before.tips[crack][at_end], here.tips[crack][at_end]});
+            }
         }
         fracture_energy_.push_back(spent);
         const Quasistatic::Critical found = walk_.critical(i, materials_, now);
@@ -130,19 +133,27 @@ class Tracer {
                 known = know_station(++next, now);
             }
             if (!known) return end(RunStatus::finished, "the crack's way ends here");
-            const bool left = walk_.station(next).left;
+            const bool parted = carries_nothing(next, now);
+            const bool left = walk_.station(next).left || parted;
             if (next > i + 1 || left || critical_[next] <= now) {
                 const Moment after = jump(next, now);
                 add(after, true);
                 here = after;
                 if (beyond_length(after)) return end(RunStatus::finished, "a stop condition was met");
-                if (left) return split();
+                if (left) return parted ? end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more") : split();
             }
             i = next;
         }
     }
 
-    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface"); }
+    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface or another crack"); }
+
+    // The load has gone, but for rounding and what Newton's method leaves.
+    bool carries_nothing(std::size_t i, double now) {
+        constexpr double nothing = 1e-6;
+        if (growing_tips(scene_) < 2 || most_power_ == 0.0) return false;  // a single tip that has gone through says it itself
+        return std::abs(moment(i, now).load.power) <= nothing * most_power_;
+    }
 
     // The unloaded start.
     Moment moment_at_rest() {
@@ -255,6 +266,7 @@ class Tracer {
             row.external_work = m.load.traction_work;
         }
         last_ = m;
+        most_power_ = std::max(most_power_, std::abs(m.load.power));
         record_.series.push_back(row);
     }
 
@@ -265,20 +277,15 @@ class Tracer {
     }
 
     void record_paths() {
-        const double length = record_.series.back().crack_length;
         for (std::size_t k = 0; k < scene_.cracks.size(); ++k) {
             std::vector<Vec2> path = scene_.cracks[k].points;
-            for (std::size_t i = 0; i < critical_.size(); ++i) {
-                const Station& station = walk_.station(i);
-                if (tracked_.crack == static_cast<int>(k) && station.lengths[k] > length * (1.0 + 1e-12)) break;
-                if (station.tips[k][1] != path.back()) path.push_back(station.tips[k][1]);
-                if (station.tips[k][0] != path.front()) path.insert(path.begin(), station.tips[k][0]);
-            }
-            if (tracked_.crack == static_cast<int>(k)) {
-                const Vec2 tip = record_.series.back().tip;
-                if (tracked_.at_end && tip != path.back()) path.push_back(tip);
-                if (!tracked_.at_end && tip != path.front()) path.insert(path.begin(), tip);
-            }
+            const auto add = [&](const std::array<Vec2, 2>& tips) {
+                if (tips[1] != path.back()) path.push_back(tips[1]);
+                if (tips[0] != path.front()) path.insert(path.begin(), tips[0]);
+            };
+            for (std::size_t i = 0; i < critical_.size() && walk_.station(i).lengths[k] <= last_.lengths[k] * (1.0 + 1e-12); ++i)
+                add(walk_.station(i).tips[k]);
+            add(last_.tips[k]);
             record_.paths.push_back(path);
         }
     }
@@ -286,15 +293,16 @@ class Tracer {
     // A place that the crack jumped over has a row where its critical load lies between equilibria that are known.
     void list_driving(std::size_t i, const Quasistatic::Critical& found, double now) {
         const Station& station = walk_.station(i);
-        if (station.crack < 0 || !std::isfinite(found.time)) return;
+        if (station.moving.empty() || !std::isfinite(found.time)) return;
         if (!station.linear && found.time < now && found.time < station.states.begin()->second.time) return;
         const LoadState load = station.at(found.time);
+        const auto& [crack, at_end, route] = station.moving.front();
         CriticalLoad row;
-        row.crack_length = station.lengths[station.crack];
-        row.tip = station.tips[station.crack][station.at_end];
+        row.crack_length = station.lengths[crack];
+        row.tip = station.tips[crack][at_end];
         row.displacement = load.displacement;
         if (!load.reactions.empty()) row.force = load.reactions[gauges_.force].dot(gauges_.force_direction);
-        row.G = load.tips[2 * station.crack + station.at_end].G;
+        row.G = load.tips[2 * crack + at_end].G;
         row.toughness = found.toughness;
         record_.driving.push_back(row);
     }
@@ -315,6 +323,7 @@ class Tracer {
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;
+    double most_power_ = 0;                // [W]
 };
 
 } // namespace

@@ -157,23 +157,27 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
-    const KeptWalks walks(study);
+    const int threads = thread_count(options.threads);
+    const KeptWalks walks(study, std::max(1, threads / std::max(1, static_cast<int>(study.experiments.size()))));
     const StudyModel model(study, own ? walks.exact() : options.forward, own ? solver_resolution : 0.0, options.stop_requested);
     const bool only_toughness = own && walks.only_toughness();
     const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
-    const Near near = [&](const Eigen::VectorXd& point) -> Objective::Evaluate {
-        const Eigen::VectorXd values = model.box().values(point);
-        auto close = std::make_shared<StudyModel>(study, walks.near({values.begin(), values.end()}), solver_resolution, options.stop_requested);
-        return [close](const Eigen::VectorXd& x, int threads) { return close->evaluate(x, threads); };
+    const auto by_walk_of = [&](Forward (KeptWalks::*forward)(const std::vector<double>&) const) -> Near {
+        return [&, forward](const Eigen::VectorXd& point) -> Objective::Evaluate {
+            const Eigen::VectorXd values = model.box().values(point);
+            auto close = std::make_shared<StudyModel>(study, (walks.*forward)({values.begin(), values.end()}), solver_resolution, options.stop_requested);
+            return [close](const Eigen::VectorXd& x, int with) { return close->evaluate(x, with); };
+        };
     };
+    const Near near = by_walk_of(&KeptWalks::near);
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int threads) {
-            return store.at(box.values(x), [&] { return model.evaluate(x, threads); });
+        box.size(), [&](const Eigen::VectorXd& x, int with) {
+            return store.at(box.values(x), [&] { return model.evaluate(x, with); });
         },
-        study.optimizer.max_runs, thread_count(options.threads), options.stop_requested,
+        study.optimizer.max_runs, threads, options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
@@ -181,7 +185,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
     const SearchResult found =
-        by_walks ? descend_by_walks(objective, near, study.optimizer.starts, box.initial(), options.seed, stage)
+        by_walks ? descend_by_walks(objective, near, by_walk_of(&KeptWalks::rough), study.optimizer.starts, box.initial(), options.seed, stage)
                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
     objective.set_budget_left(objective.budget_left() + reserve);
 

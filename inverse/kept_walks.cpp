@@ -35,7 +35,7 @@ bool has(const Scene& scene, const std::string& key) {
 
 class KeptWalks::Store {
   public:
-    explicit Store(const Study& study) {
+    Store(const Study& study, int threads) : threads_(threads) {
         for (const Scene* scene : scenes_of(study)) {
             scenes_.push_back(scene);
         }
@@ -46,17 +46,17 @@ class KeptWalks::Store {
         }
     }
 
-    Record run(const Scene& scene, const std::atomic<bool>* stop) { return run(scene, scene, stop); }
+    Record run(const Scene& scene, const std::atomic<bool>* stop) { return run(scene, scene, false, stop); }
 
     // On the walk of the scene with other values.
-    Record run_near(const std::vector<double>& values, const Scene& scene, const std::atomic<bool>* stop) {
+    Record run_near(const std::vector<double>& values, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         Scene base = scene;
         for (const Setting& setting : others_) {
             if (has(base, setting.key)) {
                 set_number(base, setting.key, values[setting.parameter]);
             }
         }
-        return run(base, scene, stop);
+        return run(base, scene, rough, stop);
     }
 
     bool only_toughness() const {
@@ -74,11 +74,11 @@ class KeptWalks::Store {
         return std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return !scene->output.probes.places.empty(); });
     }
 
-    Record run(const Scene& base, const Scene& scene, const std::atomic<bool>* stop) {
+    Record run(const Scene& base, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         SimulateOptions options;
         options.stop_requested = stop;
         const std::shared_ptr<KeptWalk> walk = walk_of(base);
-        return walk->reusable() ? walk->run(scene, options) : simulate(scene, options);
+        return walk->reusable() ? walk->run(scene, options, rough) : simulate(scene, options);
     }
 
     // What tells walks apart: the scene as it was read, and what the fit has changed in it.
@@ -103,7 +103,7 @@ class KeptWalks::Store {
                 numbers.push_back(setting.key);
             }
         }
-        return std::make_shared<KeptWalk>(scene, numbers);
+        return std::make_shared<KeptWalk>(scene, numbers, threads_);
     }
 
     std::shared_ptr<KeptWalk> walk_of(const Scene& scene) {
@@ -121,13 +121,14 @@ class KeptWalks::Store {
         return walks_.back().second;
     }
 
+    int threads_;
     std::vector<const Scene*> scenes_;
     std::vector<Setting> toughness_, others_;
     std::mutex mutex_;
     std::deque<std::pair<std::string, std::shared_ptr<KeptWalk>>> walks_;
 };
 
-KeptWalks::KeptWalks(const Study& study) : store_(std::make_shared<Store>(study)) {}
+KeptWalks::KeptWalks(const Study& study, int threads) : store_(std::make_shared<Store>(study, threads)) {}
 KeptWalks::~KeptWalks() = default;
 
 Forward KeptWalks::exact() const {
@@ -135,7 +136,11 @@ Forward KeptWalks::exact() const {
 }
 
 Forward KeptWalks::near(const std::vector<double>& values) const {
-    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, stop); };
+    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, false, stop); };
+}
+
+Forward KeptWalks::rough(const std::vector<double>& values) const {
+    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, true, stop); };
 }
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }

@@ -12,7 +12,8 @@ namespace crampfit {
 /// from several threads.
 class KeptWalks {
   public:
-    explicit KeptWalks(const Study& study);
+    /// Each walk is solved with `threads` threads.
+    explicit KeptWalks(const Study& study, int threads = 1);
     ~KeptWalks();
 
     /// The simulation itself, on a walk of its own where the scene has other moduli than any that is kept.
@@ -21,6 +22,9 @@ class KeptWalks {
     /// The simulation near a point of the study, `values` of its parameters, on the walk of that point: exact for toughness, to first
     /// order for all other parameters, which takes milliseconds once that walk is there.
     Forward near(const std::vector<double>& values) const;
+
+    /// The same from the equilibria that runs have left there, roughly where these lie apart: for a search, whose end `exact` confirms.
+    Forward rough(const std::vector<double>& values) const;
 
     /// Whether all runs of the study are other toughnesses on walks that are kept, and cost milliseconds.
     bool only_toughness() const;

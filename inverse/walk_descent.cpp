@@ -118,17 +118,21 @@ void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, u
 namespace {
 
 // One descent; whether it ended by its own criterion.
-bool descend_from(Objective& objective, const Near& near, const Eigen::VectorXd& start, unsigned seed) {
+bool descend_from(Objective& objective, const Near& near, const Near& rough, const Eigen::VectorXd& start, unsigned seed) {
     objective.at(start);
     double radius = first_radius;
     while (objective.best() && !objective.exhausted() && radius >= least_radius) {
         const Run here = *objective.best();
-        const Objective::Evaluate model = near(here.x);
-        const Run trial = lowest(model, Window(here.x, radius), here.x, objective, seed);
-        const double expected = here.evaluation->misfit - trial.evaluation->misfit;
-        if (!(expected > least_gain * here.evaluation->misfit)) {
+        const auto expected_from = [&](const Run& trial) { return here.evaluation->misfit - trial.evaluation->misfit; };
+        const auto promises = [&](const Run& trial) { return expected_from(trial) > least_gain * here.evaluation->misfit; };
+        Run trial = lowest(rough(here.x), Window(here.x, radius), here.x, objective, seed);
+        if (!promises(trial)) {
+            trial = lowest(near(here.x), Window(here.x, last_radius), here.x, objective, seed);
+        }
+        if (!promises(trial)) {
             return !objective.stopped();
         }
+        const double expected = expected_from(trial);
         objective.at(trial.x);
         const double gain = here.evaluation->misfit - objective.best()->evaluation->misfit;
         const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
@@ -145,8 +149,8 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
 
 }  // namespace
 
-SearchResult descend_by_walks(Objective& objective, const Near& near, int starts, const Eigen::VectorXd& initial, unsigned seed,
-                              const std::function<void(const std::string&)>& stage) {
+SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
+                              unsigned seed, const std::function<void(const std::string&)>& stage) {
     stage("descent");
     SearchResult result;
     int descents = 0;
@@ -154,7 +158,7 @@ SearchResult descend_by_walks(Objective& objective, const Near& near, int starts
            !(objective.best() && is_explained(*objective.best()->evaluation, initial.size()))) {
         const double least = objective.best() ? objective.best()->evaluation->misfit : INFINITY;
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, near, descents == 0 ? initial : halton(descents, initial.size(), seed), seed);
+        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : halton(descents, initial.size(), seed), seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {

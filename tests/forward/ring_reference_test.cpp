@@ -104,7 +104,9 @@ void check_rates(double cell, const Bars& contour, const Bars& energy) {
 }
 
 TEST(VerificationRings, ReactionAndEnergyReleaseRate) {
-    check_rates(0.1e-3, {0.01, 0.042, 0.043, 0.01}, {0.01, 0.035, 0.072, 0.023});
+    // Beside boundaries G at the tip and the change of energy agree: what is off there is the equilibrium, of cells that a boundary
+    // crosses, and goes as the cells get smaller.
+    check_rates(0.1e-3, {0.01, 0.025, 0.07, 0.017}, {0.01, 0.035, 0.072, 0.023});
 }
 
 TEST(SlowVerificationRings, ReactionAndEnergyReleaseRateOnAFinerGrid) {

@@ -89,12 +89,13 @@ Errors against_differences(const Scene& scene, KeptWalk& walk, const std::string
             error([](const Instant& row) { return row.displacement; })};
 }
 
-void check(const char* name, const Scene& scene, double step, double tolerance) {
+void check(const char* name, const Scene& scene, double step, double tolerance,
+           const std::vector<std::string>& toughness = {"materials.EW.toughness", "materials.LW.toughness"}) {
     KeptWalk walk(scene, numbers);
     ASSERT_TRUE(walk.has_slopes());
     walk.run(scene, {});
     std::vector<std::string> keys = numbers;
-    keys.insert(keys.end(), {"materials.EW.toughness", "materials.LW.toughness"});
+    keys.insert(keys.end(), toughness.begin(), toughness.end());
     for (const std::string& key : keys) {
         const Errors errors = against_differences(scene, walk, key, step);
         std::printf("%s, %s: force %.1e, crack length %.1e, displacement %.1e\n", name, key.c_str(), errors.force, errors.length,
@@ -108,6 +109,17 @@ void check(const char* name, const Scene& scene, double step, double tolerance) 
 TEST(GradientRecord, AcrossRings) {
     // Central differences with a step of 1e-4 are off by some 1e-8.
     check("linear", across_rings(0.4e-3), 1e-4, 1e-5);
+}
+
+TEST(GradientRecord, WhereTheTipsOwnGSaysWhenItMoves) {
+    // Advance 0: G at the tip, by J in wood that is the same all about it and near boundaries by K.
+    for (const double transition : {0.3e-3, 0.0}) {
+        Scene scene = across_rings(0.4e-3);
+        scene.cracks[0].advance = 0.0;
+        scene.specimen.rings->transition = transition;
+        // The crack runs through latewood without more load: its toughness changes nothing.
+        check(transition > 0.0 ? "advance 0" : "advance 0, sharp boundaries", scene, 1e-4, 1e-5, {"materials.EW.toughness"});
+    }
 }
 
 TEST(GradientRecord, OfAWedgeTest) {

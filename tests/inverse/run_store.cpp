@@ -123,7 +123,7 @@ TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
     std::printf("%d kills, %zu runs, %zu kept before the last start\n", killed, times.size(), begun_when_kept.size());
     EXPECT_EQ(times.size(), whole.runs.size());
     EXPECT_EQ(killed, 20);
-    EXPECT_GT(begun_when_kept.size(), 20u);
+    EXPECT_GT(begun_when_kept.size(), 3u);
     for (const auto& [run, count] : begun_when_kept) {
         EXPECT_EQ(times.at(run), count) << "run again though it was kept";
     }

@@ -1,0 +1,84 @@
+#include "forward/loose_pieces.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <numeric>
+
+namespace crampfit {
+
+namespace {
+
+// Which piece each field belongs to: the fields that points or ties join, by the first of them.
+std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks, const std::vector<double>& mass) {
+    std::vector<int> piece(cracks.fields());
+    std::iota(piece.begin(), piece.end(), 0);
+    const auto first = [&](int field) {
+        while (piece[field] != field) field = piece[field] = piece[piece[field]];
+        return field;
+    };
+    const auto join = [&](int a, int b) {
+        a = first(a);
+        b = first(b);
+        piece[std::max(a, b)] = std::min(a, b);
+    };
+    for (const std::array<int, 4>& fields : body.points.node)
+        for (int k = 1; k < 4; ++k) join(fields[0], fields[k]);
+    for (const FieldPair& pair : cracks.pairs)
+        if (shared_tie(pair, mass) > 0.0) join(pair.left, pair.right);
+    for (std::size_t f = 0; f < piece.size(); ++f) piece[f] = first(static_cast<int>(f));
+    return piece;
+}
+
+} // namespace
+
+LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
+                              const std::vector<double>& mass) {
+    const std::vector<int> piece = pieces_of(body, cracks, mass);
+    // How a component of displacement goes with a piece's ways to move as a whole: along x, along y, and turning.
+    const double size = body.layout.size().maxCoeff();
+    const auto motion = [&](int field, int axis) {
+        const Vec2 x = body.layout.node_position(cracks.node_of_field[field]) / size - Vec2(0.5, 0.5);
+        return axis == 0 ? Eigen::Vector3d(1.0, 0.0, -x.y()) : Eigen::Vector3d(0.0, 1.0, x.x());
+    };
+    std::vector<bool> held(2 * piece.size(), false), pulled(piece.size(), false);
+    std::map<int, Eigen::Matrix3d> holds;  // by piece
+    for (std::size_t f = 0; f < piece.size(); ++f)
+        if (mass[f] > 0.0) holds.emplace(piece[f], Eigen::Matrix3d::Zero());
+    for (const Boundary::Held& h : boundary.held) {
+        if (mass[h.field] == 0.0) continue;
+        held[2 * h.field + h.axis] = true;
+        const Eigen::Vector3d row = motion(h.field, h.axis);
+        holds.at(piece[h.field]) += row * row.transpose();
+    }
+    for (const Boundary::Traction& t : boundary.tractions) pulled[piece[body.points.node[t.facet.point][0]]] = true;
+
+    LoosePieces found;
+    found.loose.assign(piece.size(), false);
+    for (std::size_t f = 0; f < piece.size(); ++f) found.loose[f] = mass[f] > 0.0 && holds.at(piece[f]).isZero(0.0) && !pulled[piece[f]];
+    for (auto& [own, sum] : holds) {
+        while (!pulled[own]) {
+            constexpr double nothing = 1e-6;  // squared distance of neighbouring nodes over the specimen's size, and less
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> ways(sum);
+            if (ways.eigenvalues()[0] > nothing) break;
+            const Eigen::Vector3d free = ways.eigenvectors().col(0);
+            int best = -1;
+            double most = 0.0;
+            for (std::size_t dof = 0; dof < held.size(); ++dof) {
+                const int field = static_cast<int>(dof / 2);
+                if (piece[field] != own || mass[field] == 0.0 || held[dof]) continue;
+                const double moves = std::abs(free.dot(motion(field, static_cast<int>(dof % 2))));
+                if (moves <= most * (1.0 + 1e-9)) continue;
+                most = moves;
+                best = static_cast<int>(dof);
+            }
+            if (best < 0) break;
+            held[best] = true;
+            found.holds.push_back(best);
+            const Eigen::Vector3d row = motion(best / 2, best % 2);
+            sum += row * row.transpose();
+        }
+    }
+    return found;
+}
+
+} // namespace crampfit

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "forward/boundary.hpp"
+
+namespace crampfit {
+
+/// Pieces that cracks have cut free.
+struct LoosePieces {
+    std::vector<int> holds;     // components of displacement, 2 x field + axis, to be held besides what the boundary holds
+    std::vector<bool> loose;    // [fields] of a piece that nothing holds: it carries nothing
+
+    bool is_loose(int field) const { return field < static_cast<int>(loose.size()) && loose[field]; }
+};
+
+/// Finds the pieces, and what must be held so that none of them can move as a whole: as little as there are ways for it to move. What
+/// is held so feels no force, so that nothing else changes. Pieces that a traction pulls are left alone: they fly off.
+LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
+                              const std::vector<double>& mass);
+
+} // namespace crampfit

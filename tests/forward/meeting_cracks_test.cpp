@@ -1,0 +1,178 @@
+// Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were alone.
+#include "forward/simulate.hpp"
+#include "tests/forward/cracked_plates.hpp"
+#include "tests/forward/hard_cases.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace crampfit::test {
+namespace {
+
+constexpr double mm_per_minute = 1e-3 / 60.0;
+
+Crack line(Vec2 from, Vec2 to, Growth grows = Growth::none) {
+    Crack crack;
+    crack.points = {1e-3 * from, 1e-3 * to};
+    crack.grows = grows;
+    crack.direction = GrowthDirection::straight;
+    crack.advance = grows == Growth::none ? 0.0 : 2e-3;
+    return crack;
+}
+
+// 20 x 20 mm, drawn apart by its upper and lower side.
+Scene square(std::vector<Crack> cracks) {
+    Scene scene = at_equilibrium(block({20e-3, 20e-3}, 1e-3));
+    scene.materials["EW"].toughness = 0.1;
+    scene.edges = {moving("top", Side::top, {0.0, mm_per_minute}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.cracks = std::move(cracks);
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 3e-3;
+    return scene;
+}
+
+double stiffness_at_the_end(const Record& record) { return record.series.back().force / record.series.back().displacement; }
+
+// The same without the lower left block that the cracks cut free.
+double stiffness_without_the_block(std::optional<std::pair<double, double>> held) {
+    Scene scene = square({});
+    scene.specimen.cutouts = {Polygon{{{-1e-3, -1e-3}, {8e-3, -1e-3}, {8e-3, 10e-3}, {-1e-3, 10e-3}}}};
+    scene.edges[1].range = held;
+    scene.stop.displacement = 1e-5;
+    return stiffness_at_the_end(simulate(scene));
+}
+
+TEST(HardMeeting, ACrackThatRunsIntoAnotherCutsABlockFree) {
+    for (const bool held : {true, false}) {
+        const std::optional<std::pair<double, double>> range = held ? std::nullopt : std::optional(std::pair{7.9e-3, 20e-3});
+        const double exact = stiffness_without_the_block(range);
+        for (const double lift : {0.0, 1e-6, 0.4}) {  // of the crack that grows [mm]; on a grid line and off it
+            if (lift == 0.4 && !held) continue;
+            Scene scene = square({line({0, 10 + lift}, {4, 10 + lift}, Growth::end), line({8, 0}, {8, 13})});
+            scene.edges[1].range = range;
+            const Record record = simulate(scene);
+            const std::string name = fmt::format("T-junction, {} mm off a grid line, block {}", lift, held ? "held" : "loose");
+            EXPECT_EQ(record.status, RunStatus::split) << record.message;
+            EXPECT_NEAR(record.series.back().tip.x(), 8e-3, 1e-9);
+            // What the block leaves has a slit of 3 mm above it, which a cutout of the block has not.
+            Scene alone = scene;
+            alone.cracks = {line({8, 10 + lift}, {8, 13})};
+            alone.specimen.cutouts = {Polygon{{{-1e-3, -1e-3}, {8e-3, -1e-3}, {8e-3, (10 + lift) * 1e-3}, {-1e-3, (10 + lift) * 1e-3}}}};
+            alone.edges[1].range = {{7.9e-3, 20e-3}};
+            alone.stop.displacement = 1e-5;
+            const double left = stiffness_at_the_end(simulate(alone));
+            hard_case(name, "carries as the specimen without the block, with a slit", stiffness_at_the_end(record) / left - 1, lift == 0.4 ? 0.02 : 1e-6);
+            EXPECT_LT(stiffness_at_the_end(record), exact);
+        }
+    }
+}
+
+TEST(HardMeeting, TwoEdgeCracksMeetHeadOn) {
+    for (const double shift : {0.0, 0.37}) {
+        for (const double right : {14.0, 15.5}) {
+            const Record record = simulate(square({line({0, 10 + shift}, {6, 10 + shift}, Growth::end),
+                                                   line({20, 10 + shift}, {right, 10 + shift}, Growth::end)}));
+            EXPECT_EQ(record.status, RunStatus::split) << record.message;
+            const Instant& end = record.series.back();
+            const double grown = end.crack_length + record.cracks[0].length.back();
+            const std::string name = fmt::format("edge cracks head on, {:.2f} mm off a grid line, ligament {:.1f} mm", shift, right - 6);
+            hard_case(name, "together as long as the specimen is wide", grown / 20e-3 - 1, 1e-9);
+            hard_case(name, "nothing is carried", end.force, 1e-9);
+            hard_case(name, "toughness times new face is spent", end.fracture_energy / (0.1 * (right - 6) * 1e-3) - 1, 1e-6);
+        }
+    }
+}
+
+TEST(HardMeeting, ACrackThatPartsTheSpecimenEndsTheRun) {
+    // The other one stands in a piece that nothing pulls any more.
+    const Record record = simulate(square({line({0, 6}, {9, 6}, Growth::end), line({20, 14}, {16, 14}, Growth::end)}));
+    std::printf("two edge cracks of 9 and 4 mm: %s, %s; %.1f and %.1f mm\n", name(record.status), record.message.c_str(),
+                1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back());
+    EXPECT_EQ(record.status, RunStatus::split);
+    EXPECT_NEAR(record.series.back().crack_length, 20e-3, 1e-9);
+    EXPECT_LT(record.cracks[0].length.back(), 10e-3);
+    EXPECT_NEAR(record.series.back().force, 0.0, 1e-9);
+}
+
+TEST(HardMeeting, CracksThatPassEachOtherCurveIn) {
+    // En passant, 2.4 cells apart: both grow, the ligament goes, the specimen parts.
+    Scene scene = square({line({0, 8.8}, {7, 8.8}, Growth::end), line({20, 11.2}, {13, 11.2}, Growth::end)});
+    for (Crack& crack : scene.cracks) crack.direction = GrowthDirection::hoop_stress;
+    scene.stop.displacement = 2e-3;
+    const Record record = simulate(scene);
+    const double end = record.series.back().force, most = std::max_element(record.series.begin(), record.series.end(), [](auto& a, auto& b) { return a.force < b.force; })->force;
+    std::printf("en passant: %s, lengths %.2f and %.2f mm, force at the end %.2e of the peak, %ld equilibria\n", name(record.status),
+                1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back(), end / most, record.steps);
+    EXPECT_NE(record.status, RunStatus::unstable) << record.message;
+    EXPECT_LT(end, 0.02 * most);
+    for (const Instant& row : record.series) EXPECT_GE(row.strain_energy, -1e-12);
+}
+
+TEST(HardMeeting, CrossesThatCutAPlateInFourCarryNothing) {
+    for (const double angle : {0.0, 31.0}) {
+        const Vec2 along(std::cos(angle * degree), std::sin(angle * degree)), across(-along.y(), along.x());
+        const Vec2 centre(10.3, 9.8);
+        const Record record = simulate(square({line(centre - 40 * along, centre + 40 * along), line(centre - 40 * across, centre + 40 * across)}));
+        hard_case(fmt::format("cracks through a plate that cross, {:.0f} deg", angle), "nothing is carried", record.series.back().force, 1e-9);
+    }
+}
+
+TEST(HardMeeting, AClosedCrackAcrossAnotherChangesNothing) {
+    // Pressed together along its own line of symmetry it carries all that the wood carried.
+    for (const double offset : {0.0, 0.5}) {
+        SlantedCrack plate;
+        plate.remote << -3e5, 0, 0, 1e5;
+        plate.offset = {offset, offset};
+        Scene scene = slanted_crack(plate);
+        const Vec2 centre = 0.5 * (scene.cracks[0].points[0] + scene.cracks[0].points[1]);
+        Crack closed;
+        closed.points = {centre - Vec2(0, 8e-3), centre + Vec2(0, 8e-3)};
+        scene.cracks.push_back(closed);
+        const AtRest run(scene);
+        ASSERT_TRUE(run.solved());
+        const double exact = 1e5 * 1e5 * std::numbers::pi * 10e-3 / plane_modulus();
+        hard_case(fmt::format("a closed crack across a Griffith crack, {:.1f} cells off a node", offset), "exact G", run.load().G / exact - 1, 0.02);
+    }
+}
+
+TEST(HardMeeting, ACrackLeavesThroughACorner) {
+    for (const double off : {0.0, 0.2}) {
+        Scene scene = square({line({0, 0 + off}, {8, 8 + off}, Growth::end)});
+        scene.edges = {moving("top", Side::top, {-mm_per_minute, mm_per_minute}), moving("right", Side::right, {0.0, 0.0})};
+        scene.edges[0].range = {{0.0, 15e-3}};
+        scene.edges[1].range = {{0.0, 15e-3}};
+        scene.measure = {"top", "top"};
+        const Record record = simulate(scene);
+        const std::string name = fmt::format("a diagonal crack, {:.1f} mm off the corner", off);
+        EXPECT_EQ(record.status, RunStatus::split) << record.message;
+        hard_case(name, "nothing is carried", record.series.back().force, 1e-9);
+        hard_case(name, "it ends at the corner", record.series.back().crack_length / ((20 - off) * std::sqrt(2.0) * 1e-3) - 1, 1e-6);
+    }
+}
+
+TEST(HardMeeting, ACrackThatEndsAtAHoleCutsNothingBehindIt) {
+    for (const double radius : {3.0, 0.8}) {
+        Scene scene = square({line({0, 10}, {10 - radius, 10})});
+        scene.stop.displacement = 1e-5;
+        scene.specimen.cutouts = {Circle{{10e-3, 10e-3}, radius * 1e-3}};
+        const double touches = stiffness_at_the_end(simulate(scene));
+        scene.cracks = {line({0, 10}, {10.2 - radius, 10})};
+        const double reaches_in = stiffness_at_the_end(simulate(scene));
+        scene.stop.displacement = 3e-3;
+        scene.cracks = {line({0, 10}, {8 - radius, 10}, Growth::end)};
+        const Record grown = simulate(scene);
+        EXPECT_EQ(grown.status, RunStatus::split) << grown.message;
+        const std::string name = fmt::format("a crack into a hole of {:.1f} mm radius", radius);
+        hard_case(name, "as stiff as with a crack that ends a hair inside it", touches / reaches_in - 1, 1e-3);
+        hard_case(name, "grown there as when it was there from the start", stiffness_at_the_end(grown) / touches - 1, 1e-3);
+        Scene whole = square({});
+        whole.stop.displacement = 1e-5;
+        // Wood behind the hole holds: a crack through it all would leave nothing.
+        EXPECT_GT(touches, 0.2 * stiffness_at_the_end(simulate(whole)));
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::test
