@@ -1,3 +1,4 @@
+#include "cli/picture_times.hpp"
 #include "cli/pictures.hpp"
 #include "cli/progress.hpp"
 #include "cli/stop.hpp"
@@ -13,12 +14,16 @@ namespace crampfit::cli {
 
 namespace {
 
-ExitStatus correlate(const PictureSeries& pictures, const CommonOptions& common) {
+ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, const CommonOptions& common) {
     check_series(pictures, common);
     const std::optional<double> pixel = pixel_of(pictures);
     const Correlator correlator = make_correlator(pictures, common);
-    const FieldSeries series{pictures.reference.string(), names_of(pictures),     correlator.lattice(),
-                             pictures.options.subset,     pictures.options.order, pixel};
+    const FinePicture reference = read_reference(pictures);
+    FieldSeries series{pictures.reference.string(), names_of(pictures), correlator.lattice(), pictures.options.subset,
+                       pictures.options.order, pixel, reference.columns, reference.rows, {}, {}};
+    const PictureInstants instants = read_picture_times(times, series.images.size(), common);
+    series.time = instants.time;
+    series.displacement = instants.displacement;
 
     stop_on_signals();
     ProgressLine line(common, "points");
@@ -37,7 +42,7 @@ ExitStatus correlate(const PictureSeries& pictures, const CommonOptions& common)
     };
     write_fields(series, next_field, pictures.output);
     if (!pictures.preview.empty() && last)
-        draw_field(read_reference(pictures), series.lattice, *last, pictures.preview);
+        draw_field(reference, series.lattice, *last, pictures.preview);
     report(common, fmt::format("{} of {} points in {} images followed, saved as {}", followed,
                                static_cast<long>(series.lattice.count()) * done, done, pictures.output.string()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
@@ -49,7 +54,9 @@ Verb correlate_verb(CLI::App& command, const CommonOptions& common) {
     auto pictures = std::make_shared<PictureSeries>();
     CLI::App* verb = command.add_subcommand("correlate", "Displacement and strain by image correlation");
     add_picture_series(*verb, *pictures, "FIELD.h5");
-    return {verb, [pictures, &common] { return correlate(*pictures, common); }};
+    auto times = std::make_shared<PictureTimes>();
+    add_picture_times(*verb, *times);
+    return {verb, [pictures, times, &common] { return correlate(*pictures, *times, common); }};
 }
 
 }  // namespace crampfit::cli

@@ -54,6 +54,19 @@ std::vector<double> column(const Comparison& comparison, double FitResidual::*me
     return values;
 }
 
+bool is_field(const Comparison& comparison) { return comparison.kind.starts_with("u_"); }
+
+/// Displacements of points are many and at few instants: they are drawn over what the model has.
+std::string field_figure(const Comparison& comparison) {
+    const ScaledUnit micrometre{1e-6, "um"};
+    return draw({.title = fmt::format("{}: {} of the displacement fields", comparison.experiment, comparison.kind),
+                 .x_label = "Fitted [um]",
+                 .y_label = "Measured [um]",
+                 .series = {{.colour = colour::black, .kind = Kind::points,
+                             .x = scaled(column(comparison, &FitResidual::modelled), micrometre),
+                             .y = scaled(column(comparison, &FitResidual::measured), micrometre)}}});
+}
+
 /// An arrival is drawn the way that people draw it: crack length over the displacement of its arrival.
 std::string comparison_figure(const Comparison& comparison) {
     const bool arrival = comparison.kind == "arrival";
@@ -81,10 +94,11 @@ std::string comparison_figure(const Comparison& comparison) {
 
 std::string residuals_figure(const Comparison& comparison) {
     const bool arrival = comparison.kind == "arrival";
-    const std::vector<double> at = scaled(column(comparison, &FitResidual::at), {1e-3, "mm"});
+    const bool field = is_field(comparison);
+    const std::vector<double> at = scaled(column(comparison, field ? &FitResidual::modelled : &FitResidual::at), {1e-3, "mm"});
     return draw(
         {.title = fmt::format("{}: residuals of {}", comparison.experiment, comparison.kind),
-         .x_label = arrival ? "Crack length [mm]" : "Displacement [mm]",
+         .x_label = arrival ? "Crack length [mm]" : field ? "Displacement of the point, fitted [mm]" : "Displacement [mm]",
          .y_label = "(fitted − measured) / sigma [–]",
          .series = {{.colour = colour::blue, .kind = Kind::points, .x = at, .y = column(comparison, &FitResidual::residual)}},
          .y_levels = {-2, 0, 2}});
@@ -93,7 +107,7 @@ std::string residuals_figure(const Comparison& comparison) {
 std::string comparisons_section(const Fit& fit) {
     std::vector<std::string> drawings;
     for (const Comparison& comparison : comparisons(fit)) {
-        drawings.push_back(comparison_figure(comparison));
+        drawings.push_back(is_field(comparison) ? field_figure(comparison) : comparison_figure(comparison));
         drawings.push_back(residuals_figure(comparison));
     }
     if (drawings.empty())

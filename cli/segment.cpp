@@ -6,8 +6,11 @@
 #include "datasets/whole_file.hpp"
 #include "imaging/preview.hpp"
 
+#include <cmath>
+#include <cstdio>
 #include <map>
 #include <memory>
+#include <sstream>
 
 namespace crampfit::cli {
 
@@ -15,9 +18,39 @@ namespace {
 
 struct Arguments {
     std::filesystem::path image, output, borders, preview;
-    std::string pixel, growth = "auto";
+    std::filesystem::path density, direction;
+    std::string pixel, scale, growth = "auto";
+    std::vector<std::string> gray;
     int classes = 2;
 };
+
+/// Edge of a pixel from two places of the picture and their distance, as in "120,80 1320,85 = 25 mm" [m].
+double pixel_by_two_points(const std::string& text) {
+    const auto fail = [&]() -> double {
+        throw InputError("command line", "--scale", text, "must be two places in pixels and their distance, as in \"120,80 1320,85 = 25 mm\"");
+    };
+    const std::size_t equals = text.find('=');
+    double x[4];
+    int read = 0;
+    if (equals == std::string::npos ||
+        std::sscanf(text.substr(0, equals).c_str(), " %lf , %lf %lf , %lf %n", &x[0], &x[1], &x[2], &x[3], &read) != 4 ||
+        read != static_cast<int>(equals))
+        return fail();
+    const double apart = std::hypot(x[2] - x[0], x[3] - x[1]);
+    const double length = parse_quantity(trim(text.substr(equals + 1)), dimension::length, {"command line", "--scale"});
+    return std::isfinite(apart) && apart > 0 && length > 0 ? length / apart : fail();
+}
+
+/// A class by its grays, as in "EW 128-255".
+GrayClass gray_class(const std::string& text) {
+    GrayClass range;
+    std::istringstream in(text);
+    char dash = 0;
+    std::string rest;
+    if (!(in >> range.material >> range.low >> dash >> range.high) || dash != '-' || in >> rest)
+        throw InputError("command line", "--gray", text, "must be a class and its grays from 0 to 255, as in \"EW 128-255\"");
+    return range;
+}
 
 SegmentOptions options_of(const Arguments& arguments) {
     static const std::map<std::string, GrowthAxis> growths{
@@ -35,6 +68,15 @@ SegmentOptions options_of(const Arguments& arguments) {
         if (!(options.pixel > 0))
             throw InputError("command line", "--pixel", arguments.pixel, "must be greater than 0");
     }
+    if (!arguments.scale.empty()) {
+        options.pixel = pixel_by_two_points(arguments.scale);
+        options.pixel_from = "two points";
+    }
+    for (const std::string& range : arguments.gray)
+        options.gray.push_back(gray_class(range));
+    if (!arguments.density.empty())
+        options.density = read_density_table(arguments.density);
+    options.direction = arguments.direction;
     if (!arguments.borders.empty())
         options.borders = read_borders(arguments.borders);
     return options;
@@ -67,8 +109,18 @@ Verb segment_verb(CLI::App& command, const CommonOptions& common) {
     verb->add_option("-o,--output", arguments->output, "Where the specimen goes")->type_name("SPECIMEN.h5")->required();
     verb->add_option("--pixel", arguments->pixel, "Edge of a pixel, as in \"21.17 um\"; else the file's resolution tag counts")
         ->type_name("LENGTH");
+    verb->add_option("--scale", arguments->scale, "Two places in pixels and their distance, as in \"120,80 1320,85 = 25 mm\"")
+        ->type_name("X,Y X,Y = LENGTH")
+        ->excludes("--pixel");
+    auto* ranges = verb->add_option("--gray", arguments->gray, "A class by its grays, as in \"EW 128-255\"; once for each, grays in none are void")
+        ->type_name("CLASS LOW-HIGH")
+                       ->allow_extra_args(false);
+    verb->add_option("--density", arguments->density, "Table gray,density [kg/m^3]: the specimen gets a map of its density")
+        ->type_name("CAL.csv");
+    verb->add_option("--direction", arguments->direction, "Second picture, as large, to see the radial direction in")->type_name("IMAGE");
     verb->add_option("--classes", arguments->classes, "2: EW and LW; 3: transition wood between them, too")
-        ->check(CLI::IsMember({2, 3}));
+        ->check(CLI::IsMember({2, 3}))
+        ->excludes(ranges);
     verb->add_option("--growth", arguments->growth, "From pith to bark: +x, -x, +y, -y (up) or auto")->type_name("AXIS");
     verb->add_option("--borders", arguments->borders, "Ring borders to use, as `csv SPECIMEN.h5 borders` prints them")
         ->type_name("EDITED.csv");

@@ -1,16 +1,15 @@
+#include "cli/picture_times.hpp"
 #include "cli/pictures.hpp"
 #include "cli/progress.hpp"
 #include "cli/stop.hpp"
 #include "cli/verbs.hpp"
 #include "datasets/crack_track.hpp"
-#include "datasets/error.hpp"
 #include "imaging/crack_tip.hpp"
 #include "imaging/field_preview.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 namespace crampfit::cli {
@@ -19,38 +18,20 @@ namespace {
 
 struct Arguments {
     PictureSeries pictures;
-    std::filesystem::path times;
-    std::filesystem::path load;
+    PictureTimes times;
 };
 
-/// Times of the images: a row for each, in their order.
-std::vector<double> read_times(const std::filesystem::path& file, std::size_t images) {
-    const std::vector<double> times = read_curves(file).time;
-    if (times.size() != images)
-        throw InputError(
-            file.string(), "time", fmt::format("{} rows", times.size()),
-            fmt::format("needs a column time [s] with a row for each of the {} images, in their order", images));
-    for (std::size_t i = 0; i < times.size(); ++i)
-        if (std::isnan(times[i]) || (i > 0 && times[i] < times[i - 1]))
-            throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", times[i]),
-                             "times of the images must not fall, and have no gaps");
-    return times;
-}
-
-CrackTrack start_track(const Arguments& arguments) {
+CrackTrack start_track(const Arguments& arguments, const CommonOptions& common) {
     const PictureSeries& pictures = arguments.pictures;
     CrackTrack track;
     track.reference = pictures.reference.string();
     track.images = names_of(pictures);
     track.pixel = pixel_of(pictures);
-    if (!arguments.times.empty())
-        track.time = read_times(arguments.times, track.images.size());
-    if (!arguments.load.empty()) {
-        if (track.time.empty())
-            throw InputError("command line", "--load", arguments.load.string(),
-                             "needs --times, the images' times on the load's clock");
-        add_load(track, read_curves(arguments.load), arguments.load);
-    }
+    const PictureInstants instants = read_picture_times(arguments.times, track.images.size(), common);
+    track.time = instants.time;
+    track.displacement = instants.displacement;
+    track.force = instants.force;
+    track.clock = instants.clock;
     return track;
 }
 
@@ -64,7 +45,7 @@ void keep_first(CrackTrack& track, std::size_t count) {
 ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& common) {
     const PictureSeries& pictures = arguments.pictures;
     check_series(pictures, common);
-    CrackTrack track = start_track(arguments);
+    CrackTrack track = start_track(arguments, common);
     const FinePicture reference = read_reference(pictures);
     const Correlator correlator = make_correlator(pictures, common);
     const FieldGeometry geometry{correlator.lattice(), pictures.options.subset, reference.columns, reference.rows};
@@ -93,11 +74,7 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
     CLI::App* verb = command.add_subcommand("track", "Crack tip and crack length from pictures");
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
-    verb->add_option("--times", arguments->times, "Table with the column time [s], a row an image")
-        ->type_name("TIMES.csv");
-    verb->add_option("--load", arguments->load,
-                     "Table with time [s] on the same clock and displacement [mm], force [N] or both")
-        ->type_name("LOAD.csv");
+    add_picture_times(*verb, arguments->times);
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};
 }
 

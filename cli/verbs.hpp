@@ -20,6 +20,7 @@ Verb fit_verb(CLI::App& command, const CommonOptions& common);
 Verb segment_verb(CLI::App& command, const CommonOptions& common);
 Verb correlate_verb(CLI::App& command, const CommonOptions& common);
 Verb track_verb(CLI::App& command, const CommonOptions& common);
+Verb camera_verb(CLI::App& command, const CommonOptions& common);
 Verb sensitivity_verb(CLI::App& command, const CommonOptions& common);
 Verb csv_verb(CLI::App& command, const CommonOptions& common);
 Verb report_verb(CLI::App& command, const CommonOptions& common);

@@ -42,40 +42,9 @@ const LoadColumn load_columns[] = {
     {"force", {"N", "of the loading at each image's time"}, &CrackTrack::force},
 };
 
-/// Linear between the rows; not a number outside them or beside a gap.
-double interpolate(const std::vector<double>& times, const std::vector<double>& values, double time) {
-    if (!(time >= times.front() && time <= times.back()))
-        return CrackTip::unknown;
-    const auto after = std::ranges::lower_bound(times, time);
-    const auto i = static_cast<std::size_t>(after - times.begin());
-    if (*after == time)
-        return values[i];
-    const double part = (time - times[i - 1]) / (times[i] - times[i - 1]);
-    return values[i - 1] + part * (values[i] - values[i - 1]);
-}
-
 }  // namespace
 
 const char* name(TipStatus status) { return status_names.at(static_cast<std::size_t>(status)); }
-
-void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file) {
-    if (load.time.empty())
-        throw InputError(file.string(), "time", "no such column",
-                         "the load needs its time, on the clock of the images");
-    if (load.displacement.empty() && load.force.empty())
-        throw InputError(file.string(), "", "", "needs a column displacement or force beside the time");
-    for (std::size_t i = 0; i < load.time.size(); ++i)
-        if (std::isnan(load.time[i]) || (i > 0 && !(load.time[i] > load.time[i - 1])))
-            throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", load.time[i]),
-                             "times must rise from row to row, without gaps");
-    const auto add = [&](const std::vector<double>& from, std::vector<double>& to) {
-        for (const double time : track.time)
-            if (!from.empty())
-                to.push_back(interpolate(load.time, from, time));
-    };
-    add(load.displacement, track.displacement);
-    add(load.force, track.force);
-}
 
 Curves curves_of(const CrackTrack& track) {
     Curves curves;
@@ -111,6 +80,14 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
                 values.push_back(tip.*column.value);
             root.write(column.name, values, column.meaning);
         }
+        if (track.clock) {
+            Group clock = root.make_group("clock", "load time = offset + rate * image time");
+            clock.write("offset", track.clock->offset, {"s", "of the images' time 0 on the load's clock"});
+            clock.write("rate", track.clock->rate, {"1", "seconds of the load's clock in one of the images'"});
+            clock.write_text("reason", track.clock->reason, "how that is known");
+            if (track.clock->misalignment)
+                clock.write("misalignment", *track.clock->misalignment, {"s", "that is left between the clocks, one sigma"});
+        }
         for (const LoadColumn& column : load_columns)
             if (!(track.*column.values).empty())
                 root.write(column.name, track.*column.values, column.meaning);
@@ -138,6 +115,12 @@ CrackTrack read_crack_track(const std::filesystem::path& file) {
         const std::vector<double> values = root.read_column<double>(column.name, count);
         for (std::size_t i = 0; i < count; ++i)
             track.tips[i].*column.value = values[i];
+    }
+    if (root.has("clock")) {
+        const Group clock = root.group("clock");
+        track.clock = ClockSetting{clock.read_number<double>("offset"), clock.read_number<double>("rate"), clock.read_text("reason"), {}};
+        if (clock.has("misalignment"))
+            track.clock->misalignment = clock.read_number<double>("misalignment");
     }
     for (const LoadColumn& column : load_columns)
         if (root.has(column.name))

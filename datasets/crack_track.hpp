@@ -36,20 +36,25 @@ struct CrackTip {
     double sigma = unknown;      // standard error of the length [px]
 };
 
+/// How the images' clock was set by the load's: load time = offset + rate * image time.
+struct ClockSetting {
+    double offset = 0;                   // [s]
+    double rate = 1;                     // seconds of the load's clock in one of the images'
+    std::string reason;                  // how that is known, for a person
+    std::optional<double> misalignment;  // that is left between the clocks, one sigma, where a shared channel tells [s]
+};
+
 /// Crack tip and crack length in a series of images, with what else is known of their times.
 struct CrackTrack {
     std::string reference;
     std::vector<std::string> images;
     std::optional<double> pixel;       // edge of a pixel, where it was told [m]
     std::vector<CrackTip> tips;        // of each image
-    std::vector<double> time;          // of each image, or empty [s]
+    std::vector<double> time;          // of each image on the load's clock, or empty [s]
     std::vector<double> displacement;  // of the loading then, or empty [m]; not a number outside the load's record
     std::vector<double> force;         // of the loading then, or empty [N]; likewise
+    std::optional<ClockSetting> clock; // where a load was given
 };
-
-/// Displacement and force at the images' times, from the curves of a test on the same clock, linearly between its rows.
-/// Throws InputError, naming `file`, for curves without a time that rises or without anything beside it.
-void add_load(CrackTrack& track, const Curves& load, const std::filesystem::path& file);
 
 /// What a fit takes as an experiment's data: time, displacement, force and crack length as far as they are known.
 Curves curves_of(const CrackTrack& track);

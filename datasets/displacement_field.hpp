@@ -60,6 +60,9 @@ struct FieldSeries {
     int subset = 0;               // edge of a subset [px]
     int order = 1;                // of the warp within a subset
     std::optional<double> pixel;  // edge of a pixel, where it was told [m]
+    int columns = 0, rows = 0;    // of the pictures [px]; 0: not known
+    std::vector<double> time;          // of each image, or empty [s]
+    std::vector<double> displacement;  // of the loading at each image, or empty [m]
 };
 
 /// Writes a field file, kind "field". `field_of` gives the field of an image by its number; it is called once for each,

@@ -22,13 +22,30 @@ struct Noise {
     std::optional<double> crack_length;  // [m]
     std::optional<double> displacement;  // [m]
     std::optional<double> time;          // [s]
+    std::optional<double> displacement_field = {};  // of each component, at each point [m]; absent: as the file has it
+};
+
+/// Displacement fields of a test's pictures against that of the unloaded specimen, in the specimen's coordinates. Each value is the
+/// mean over a subset of pixels, which counts as a square.
+struct MeasuredFields {
+    std::filesystem::path file;
+    std::vector<Vec2> places;                // [points] middles of the subsets, undeformed [m]
+    std::vector<double> instants;            // [pictures] rising: times [s], or displacements of the loading [m]
+    bool by_displacement = false;
+    std::vector<std::vector<Vec2>> moved;    // [pictures][points] [m]; not a number where the point was lost
+    std::vector<std::vector<double>> sigma;  // [pictures][points] standard error of each component [m]
+    double subset = 0;                       // edge [m]
+    double rotation = 0;                     // of the subsets, counter-clockwise [rad]
+    int order = 1;                           // of the warp that each subset was followed with
+    bool camera_moves = true;                // against the specimen, a little, as a whole: says nothing then
 };
 
 /// What a test gave, and the scene that models it.
 struct Experiment {
     std::string name;
     Scene scene;
-    Curves data;
+    Curves data;                           // none of its columns, where fields are all there is
+    std::optional<MeasuredFields> fields = {};
     Noise noise;
     double weight = 1.0;
     std::filesystem::path data_file;
@@ -92,6 +109,17 @@ struct SensitivityChoice {
     SensitivityMethod method = SensitivityMethod::local;
     int samples = 0;  // sobol: rows of each of the two sample matrices; morris: trajectories; 0: as many as the method needs
 };
+
+/// What a scene must be asked for so that its record can be compared with measured fields: `samples_a_subset` places in each subset,
+/// point by point, at each picture's instant.
+Probes probes_for(const MeasuredFields& fields);
+
+/// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives at its
+/// middle [samples_a_subset].
+std::vector<double> subset_weights(int order);
+
+inline constexpr int samples_a_side = 5;
+inline constexpr int samples_a_subset = samples_a_side * samples_a_side;
 
 /// What is fitted to what, or, for a sensitivity study, which outputs are asked for.
 struct Study {

@@ -30,6 +30,17 @@ const FieldColumn field_columns[] = {
     {"sigma", {"px", "standard error of u and v by the noise of the pictures"}, &DisplacementField::sigma},
 };
 
+struct InstantColumn {
+    const char* name;
+    hdf5::Meaning meaning;
+    std::vector<double> FieldSeries::*values;
+};
+
+const InstantColumn instant_columns[] = {
+    {"time", {"s", "of each image"}, &FieldSeries::time},
+    {"displacement", {"m", "of the loading at each image"}, &FieldSeries::displacement},
+};
+
 hdf5::Shape shape_of(const PointLattice& lattice) {
     return {static_cast<std::size_t>(lattice.rows), static_cast<std::size_t>(lattice.columns)};
 }
@@ -92,6 +103,13 @@ FieldSeries read_series(const Group& root) {
         series.pixel = root.read_number<double>("pixel");
     series.lattice = read_lattice(root.group("lattice"));
     series.images = root.read_texts("image files");
+    if (root.has("picture columns")) {
+        series.columns = read_int(root, "picture columns", 1);
+        series.rows = read_int(root, "picture rows", 1);
+    }
+    for (const InstantColumn& column : instant_columns)
+        if (root.has(column.name))
+            series.*column.values = root.read_column<double>(column.name, series.images.size());
     return series;
 }
 
@@ -119,6 +137,13 @@ void write_fields(const FieldSeries& series, const std::function<std::optional<D
             written.push_back(series.images[static_cast<std::size_t>(image)]);
         }
         root.write_texts("image files", written, "pictures by their number");
+        if (series.columns > 0) {
+            root.write<std::int64_t>("picture columns", series.columns, {"px", "of all pictures"});
+            root.write<std::int64_t>("picture rows", series.rows, {"px", "of all pictures"});
+        }
+        for (const InstantColumn& column : instant_columns)
+            if (const std::vector<double>& values = series.*column.values; !values.empty())
+                root.write(column.name, std::vector<double>(values.begin(), values.begin() + written.size()), column.meaning);
     });
 }
 

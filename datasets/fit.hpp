@@ -39,8 +39,8 @@ struct FitRun {
 /// One data point of one experiment against the model at the best parameters.
 struct FitResidual {
     std::string experiment;
-    std::string kind;       // "force" or "arrival"
-    double at = 0;          // displacement [m] for force; crack length [m] for arrival
+    std::string kind;       // "force", "arrival", or a component of a displacement field, "u_x" or "u_y"
+    double at = 0;          // displacement [m] or time [s] for force and fields; crack length [m] for arrival
     double measured = 0;    // SI
     double modelled = 0;    // SI
     double sigma = 0;       // SI
@@ -50,7 +50,7 @@ struct FitResidual {
 /// Whether what is left of one measured curve looks like noise.
 struct FitCheck {
     std::string experiment;
-    std::string kind;              // "force" or "arrival"
+    std::string kind;              // as of its residuals
     int points = 0;
     double chi_square = 0;         // sum of squared residuals
     double p_chi_square = 1;       // how often noise alone makes it as large

@@ -154,7 +154,7 @@ constexpr CheckColumn check_numbers[] = {
 void write_residuals(Group& root, const std::vector<FitResidual>& residuals) {
     Group group = root.make_group("residuals", "data against model; the table `residuals`");
     group.write_texts("experiment", column_of(residuals, &FitResidual::experiment), "name of the experiment");
-    group.write_texts("kind", column_of(residuals, &FitResidual::kind), "force or arrival");
+    group.write_texts("kind", column_of(residuals, &FitResidual::kind), "force, arrival, or u_x or u_y of a displacement field");
     for (const ResidualColumn& column : residual_numbers)
         group.write(column.name, column_of(residuals, column.value), {column.units, column.description});
 }
@@ -173,7 +173,7 @@ std::vector<FitResidual> read_residuals(const Group& group) {
 void write_checks(Group& root, const std::vector<FitCheck>& checks) {
     Group group = root.make_group("checks", "whether what is left of each curve looks like noise; the table `checks`");
     group.write_texts("experiment", column_of(checks, &FitCheck::experiment), "name of the experiment");
-    group.write_texts("kind", column_of(checks, &FitCheck::kind), "force or arrival");
+    group.write_texts("kind", column_of(checks, &FitCheck::kind), "force, arrival, or u_x or u_y of a displacement field");
     std::vector<std::int64_t> points;
     for (const FitCheck& check : checks)
         points.push_back(check.points);

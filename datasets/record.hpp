@@ -67,6 +67,12 @@ struct Frame {
     std::vector<Vec2> crack;                  // first crack's vertices in the undeformed specimen [m]
 };
 
+/// What the probes of a scene read at one instant.
+struct ProbeReading {
+    std::vector<Vec2> moved;                // displacement at each place [m]; not a number where there is no material
+    std::vector<std::vector<Vec2>> cracks;  // each crack's vertices then, in the undeformed specimen [m]
+};
+
 /// What a run gives.
 struct Record {
     RunStatus status = RunStatus::finished;
@@ -79,8 +85,11 @@ struct Record {
     std::vector<CriticalLoad> driving;        // by crack length; the series is what rising displacement makes of it
 
     std::vector<Vec2> point_position;         // undeformed [m]; filled when frames are asked for
+    Vec2 point_size = Vec2::Zero();           // of a point's rectangle, where nothing is cut off it [m]; zero: not known
     std::vector<float> point_latewood;        // 0 first material .. 1 last material, for pictures
     std::vector<Frame> frames;
+
+    std::vector<ProbeReading> probes;         // one an instant asked for; those after the end of the run read as at its end
 
     std::string scene_text;                   // TOML as it was used
     std::string explanation;                  // what was modelled, as `crampfit explain` prints it

@@ -182,6 +182,7 @@ std::vector<CriticalLoad> read_driving(const Group& group) {
 void write_points(Group& root, const Record& record) {
     Group points = root.make_group("points", "the material points of the frames");
     points.write("position", record.point_position, {"m", "x, y in the undeformed specimen"});
+    points.write("size", std::vector<Vec2>{record.point_size}, {"m", "x, y of a point's rectangle, where nothing is cut off it"});
     points.write("latewood", record.point_latewood, {"1", "0 first material to 1 last material"});
     Group frames = root.make_group("frames", "the points at some instants");
     for (std::size_t i = 0; i < record.frames.size(); ++i) {
@@ -236,6 +237,8 @@ Record read_all_but_frames(const Group& root) {
     read_reactions(root, record);
     record.driving = read_driving(root.group("driving"));
     record.point_position = root.group("points").read_rows<double, 2>("position");
+    if (root.group("points").has("size"))
+        record.point_size = root.group("points").read_rows<double, 2>("size", 1)[0];
     record.point_latewood = root.group("points").read_column<float>("latewood", record.point_position.size());
     record.scene_text = root.read_text("scene_text");
     record.explanation = root.read_text("explanation");

@@ -203,9 +203,17 @@ struct Stop {
     std::optional<double> time;          // [s]
 };
 
+/// Places of the material whose displacement is asked for, at some instants of the loading.
+struct Probes {
+    std::vector<Vec2> places;      // undeformed [m]
+    std::vector<double> instants;  // rising: times [s], or displacements of the measured edge or body [m]
+    bool by_displacement = false;
+};
+
 struct Output {
     int frames = 0;      // pictures of the points
     int samples = 1000;  // rows of the series at most, about
+    Probes probes;       // set by who compares with measured displacements, not by a file
 };
 
 /// Everything that a forward run needs. SI inside; checked by `read_scene` before anything runs.

@@ -9,7 +9,7 @@
 namespace crampfit {
 
 /// What a pixel shows besides EW and LW.
-enum class Feature : std::uint8_t { wood = 0, background = 1, crack = 2, mark = 3, ray = 4 };
+enum class Feature : std::uint8_t { wood = 0, background = 1, crack = 2, mark = 3, ray = 4, resin_canal = 5 };
 
 /// Where one ring ends and the next begins, as a polyline in the picture.
 struct BorderPolyline {

@@ -103,7 +103,7 @@ void write(const Specimen& specimen, const std::filesystem::path& file) {
             if (const std::vector<float>& values = specimen.*map.values; !values.empty())
                 root.write(map.name, values, shape, map.meaning);
         if (!specimen.feature.empty())
-            root.write("feature", specimen.feature, shape, {"1", "0 wood, 1 background, 2 crack, 3 ink or dirt, 4 ray"});
+            root.write("feature", specimen.feature, shape, {"1", "0 wood, 1 background, 2 crack, 3 ink or dirt, 4 ray, 5 resin canal"});
         write_borders(root, specimen.borders);
         write_rings(root, specimen.rings);
     });

@@ -30,8 +30,8 @@ SplitOverrides split_overrides(const Overrides& overrides) {
     return split;
 }
 
-Noise read_noise(const Entry& entry, const Curves& data) {
-    entry.only({"force", "crack_length", "displacement", "time"});
+Noise read_noise(const Entry& entry, const Curves& data, bool has_fields) {
+    entry.only({"force", "crack_length", "displacement", "time", "displacement_field"});
     const auto sigma = [&](const char* name, const Dimension& dimension, const std::vector<double>& column) {
         const auto found = entry.find(name);
         if (!found) {
@@ -42,20 +42,31 @@ Noise read_noise(const Entry& entry, const Curves& data) {
         }
         return std::optional(found->number(limits::positive(dimension)));
     };
+    const auto field = entry.find("displacement_field");
+    if (field && !has_fields) {
+        field->fail("the experiment has no fields");
+    }
     return {sigma("force", dimension::force, data.force), sigma("crack_length", dimension::length, data.crack_length),
-            sigma("displacement", dimension::length, data.displacement), sigma("time", dimension::time, data.time)};
+            sigma("displacement", dimension::length, data.displacement), sigma("time", dimension::time, data.time),
+            field ? std::optional(field->number(limits::positive(dimension::length))) : std::nullopt};
 }
 
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
-    entry.only({"name", "scene", "data", "noise", "weight"});
+    entry.only({"name", "scene", "data", "fields", "noise", "weight"});
     Experiment experiment;
     const auto name = entry.find("name");
     experiment.name = name ? name->text() : fmt::format("experiment {}", number);
     experiment.scene = read_scene(entry.at("scene").existing_file(), scene_overrides);
-    experiment.data_file = entry.at("data").existing_file();
-    experiment.data = read_curves(experiment.data_file);
+    if (const auto fields = entry.find("fields")) {
+        experiment.fields = read_measured_fields(*fields, experiment.scene);
+        experiment.scene.output.probes = probes_for(*experiment.fields);
+    }
+    if (entry.has("data") || !experiment.fields) {
+        experiment.data_file = entry.at("data").existing_file();
+        experiment.data = read_curves(experiment.data_file);
+    }
     if (const auto noise = entry.find("noise")) {
-        experiment.noise = read_noise(*noise, experiment.data);
+        experiment.noise = read_noise(*noise, experiment.data, experiment.fields.has_value());
     }
     if (const auto weight = entry.find("weight")) {
         experiment.weight = weight->number(limits::positive(dimension::number));

@@ -15,4 +15,8 @@ std::vector<Parameter> read_parameters(const Entry& list, const Study& study);
 /// The `outputs` of a study. Throws InputError.
 std::vector<StudyOutput> read_outputs(const Entry& list, const Study& study);
 
+/// The `fields` of an experiment: the file that `crampfit correlate` wrote, or a table that also says how the picture lies on the specimen.
+/// Throws InputError.
+MeasuredFields read_measured_fields(const Entry& entry, const Scene& scene);
+
 }  // namespace crampfit

@@ -366,6 +366,19 @@ Box CrackFields::window(const Vec2& from, const Vec2& to) const {
     return {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach};
 }
 
+std::array<int, 4> CrackFields::fields_at(const Vec2& x) const {
+    std::array<int, 4> fields = body_->layout.cell_nodes(body_->layout.cell_at(x));
+    for (int& field : fields) {
+        const int node = field;
+        unsigned mask = 0;
+        for (int k = 0; k < static_cast<int>(lines.size()); ++k)
+            if (is_left(k, x) != is_left(k, body_->layout.node_position(node)) && freed(k, node) >= least_freed_) mask |= 1u << k;
+        const auto known = field_of_.find({node, mask});
+        if (known != field_of_.end()) field = known->second;
+    }
+    return fields;
+}
+
 Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_->layout;
     const int c = layout.cell_at(x);

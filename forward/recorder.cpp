@@ -1,5 +1,7 @@
 #include "forward/recorder.hpp"
 
+#include "forward/probes.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -48,6 +50,7 @@ Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& b
     record_.points = body.points.count();
     if (scene.output.frames > 0) {
         record_.point_position = body.points.position;
+        record_.point_size = body.layout.point_size();
         record_.point_latewood = body.points.latewood;
     }
 }
@@ -88,6 +91,7 @@ void Recorder::look() {
         save_row();
     }
     const int frames = scene_.output.frames;
+    read_due_probes();
     if (frames > 0 && frames_saved_ < frames && fraction() * std::max(1, frames - 1) >= frames_saved_) save_frame();
 }
 
@@ -151,6 +155,17 @@ void Recorder::thin_out() {
     interval_ *= 2;
 }
 
+void Recorder::read_due_probes() {
+    const Probes& probes = scene_.output.probes;
+    if (record_.probes.size() == probes.instants.size()) return;
+    const double here = probes.by_displacement ? now().displacement : solver_.time();
+    while (record_.probes.size() < probes.instants.size() && here >= probes.instants[record_.probes.size()]) read_probes_now();
+}
+
+void Recorder::read_probes_now() {
+    record_.probes.push_back(read_probes(scene_.output.probes.places, body_, solver_.cracks(), solver_.displacements()));
+}
+
 void Recorder::save_frame() {
     ++frames_saved_;
     record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements()));
@@ -169,6 +184,7 @@ void Recorder::finish(RunStatus status, std::string message) {
         if (static_cast<int>(record_.frames.size()) == scene_.output.frames) record_.frames.pop_back();
         save_frame();
     }
+    while (record_.probes.size() < scene_.output.probes.instants.size()) read_probes_now();
     for (const CrackLine& line : solver_.cracks().lines) record_.paths.push_back(line.points);
     if (crack_ >= 0) record_.cracks.erase(record_.cracks.begin() + crack_);  // the series holds it
 }

@@ -41,6 +41,8 @@ class Recorder {
   private:
     void save_row();
     void save_frame();
+    void read_due_probes();
+    void read_probes_now();
     void thin_out();
 
     const Scene& scene_;

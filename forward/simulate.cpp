@@ -2,6 +2,7 @@
 
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
+#include "forward/probes.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/recorder.hpp"
 #include "forward/trace.hpp"
@@ -48,51 +49,21 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
     return found == record.series.end() ? record.series.back() : *found;
 }
 
-// Length of a crack of the scene at a row of the series [m].
-double length_at(const Record& record, int crack, std::size_t row) {
-    if (crack == record.tracked_crack) return record.series[row].crack_length;
-    return record.cracks[crack - (crack > record.tracked_crack)].length[row];
-}
-
-// Frames at even times. A walk keeps no displacements: each frame is solved for anew with the cracks as they were then.
+// Frames at even times.
 void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
-    Discretisation body(scene, materials);
-    Equilibrium equilibrium(scene, plan, materials, body);
-    record.point_position = body.points.position;
-    record.point_latewood = body.points.latewood;
+    Revisit revisit(scene, plan, materials, walk);
+    record.point_position = revisit.body().points.position;
+    record.point_size = revisit.body().layout.point_size();
+    record.point_latewood = revisit.body().points.latewood;
     const TrackedTip tracked = tracked_tip(scene);
-    // Moves the tips that move on from a station by this share of the way to the next.
-    const auto grow = [&](std::size_t from, double share) {
-        for (const auto& [crack, at_end, route] : walk.station(from).moving) {
-            const Vec2& start = walk.station(from).tips[crack][at_end];
-            const Vec2 to = start + share * (walk.station(from + 1).tips[crack][at_end] - start);
-            const CrackTip& tip = equilibrium.cracks().lines[crack].tip(at_end);
-            if (tip.inside && (to - tip.position).norm() > 1e-6 * body.layout.cell.minCoeff()) equilibrium.grow(crack, at_end, to);
-        }
-    };
-    // How much of the way from a station to the next the cracks have gone at a row of the record.
-    const auto share_gone = [&](std::size_t from, std::size_t row) {
-        if (walk.station(from).left || !walk.reach(from + 1, record.series[row].time)) return 0.0;
-        double least = 1.0;
-        for (const auto& [crack, at_end, route] : walk.station(from).moving) {
-            const double length = length_at(record, crack, row), here = walk.station(from).lengths[crack];
-            const double grown = walk.station(from + 1).lengths[crack] - here;
-            if (length < here + grown) least = std::min(least, std::max(0.0, (length - here) / grown));
-        }
-        return least > 1.0 - 1e-9 ? 1.0 : least;
-    };
-    std::size_t station = 0;
     for (int k = 0; k < scene.output.frames; ++k) {
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
-        const std::size_t row = &instant - record.series.data();
-        while (share_gone(station, row) == 1.0) grow(station++, 1.0);
-        if (const double share = share_gone(station, row); share > 0.0) grow(station, share);
-        if (equilibrium.solve(instant.time) != Equilibrium::Outcome::solved) return;
-        record.frames.push_back(make_frame(scene, plan, body, equilibrium.displacements()));
+        if (!revisit.to(record, {static_cast<std::size_t>(&instant - record.series.data()), 0.0})) return;
+        record.frames.push_back(make_frame(scene, plan, revisit.body(), revisit.equilibrium().displacements()));
         Frame& frame = record.frames.back();
         frame.time = instant.time;
         frame.displacement = instant.displacement;
-        if (tracked.crack >= 0) frame.crack = equilibrium.cracks().lines[tracked.crack].points;
+        if (tracked.crack >= 0) frame.crack = revisit.equilibrium().cracks().lines[tracked.crack].points;
     }
 }
 
@@ -110,6 +81,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.steps = walk.equilibria();
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
+    read_probes(scene, plan, materials, walk, record);
     return record;
 }
 

@@ -23,6 +23,8 @@ constexpr int least_points = 60;  // four times the series' coefficients
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
+constexpr double most_torn = 0.8;      // share of the torn subsets that the crack must have torn
+constexpr std::size_t least_torn = 8;  // of them that say anything
 
 // Of the search for the tip.
 constexpr int most_iterations = 40;
@@ -140,6 +142,44 @@ double scan_score(const std::vector<Sample>& samples, const Line& line, double a
     const auto factor = normal.selfadjointView<Eigen::Lower>().ldlt();
     const double left = squares - right.cwiseProduct(factor.solve(right)).sum();
     return std::isfinite(left) ? left / (2 * (count - terms)) : std::numeric_limits<double>::infinity();
+}
+
+/// Places whose subsets were torn, as a crack does it.
+std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementField& field) {
+    std::vector<Vec2> torn;
+    for (int point = 0; point < lattice.count(); ++point) {
+        const PointStatus status = field.status[static_cast<std::size_t>(point)];
+        if (status == PointStatus::moved_apart || status == PointStatus::low_correlation || status == PointStatus::no_convergence)
+            torn.emplace_back(lattice.x(point), lattice.y(point));
+    }
+    return torn;
+}
+
+/// Whether a crack along the line tears most of the subsets that were torn.
+bool tears(const Line& line, const std::vector<Vec2>& torn, double width) {
+    const auto count = std::ranges::count_if(torn, [&](const Vec2& place) {
+        const Vec2 local = line.local(place);
+        return local.x() < width && std::abs(local.y()) < width;
+    });
+    return static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
+}
+
+/// The line through the torn subsets. The last of them reaches over the tip by up to half its width: the tip is taken in between. `found`
+/// says which way the crack points.
+Line along_torn(const std::vector<Vec2>& torn, const Line& found, int subset) {
+    Vec2 middle = Vec2::Zero();
+    for (const Vec2& place : torn)
+        middle += place / static_cast<double>(torn.size());
+    Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+    for (const Vec2& place : torn)
+        spread += (place - middle) * (place - middle).transpose();
+    Vec2 along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1);
+    if (along.dot(found.direction()) < 0)
+        along = -along;
+    double last = 0;
+    for (const Vec2& place : torn)
+        last = std::max(last, along.dot(place - middle));
+    return {middle + (last - 0.25 * subset) * along, std::atan2(along.y(), along.x())};
 }
 
 /// The best of a coarse grid of tips and directions.
@@ -284,6 +324,11 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
             return found;
         covariance = refine(clear, line);
     }
+    // In wood whose rings differ much in stiffness the series may fit better elsewhere than at the crack.
+    const std::vector<Vec2> torn = torn_places(lattice, field);
+    const bool missed = torn.size() >= least_torn && !tears(line, torn, clearance(geometry.subset, line.angle));
+    if (missed)
+        line = along_torn(torn, line, geometry.subset);
     const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 &&
                         line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
@@ -304,7 +349,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     found.tip = line.tip;
     found.angle = std::remainder(line.angle, 2 * std::numbers::pi);
     found.length = length_in_picture(line, geometry.columns, geometry.rows);
-    found.sigma = std::sqrt(overlap * d.dot(covariance * d));
+    found.sigma = missed ? 0.25 * geometry.subset : std::sqrt(overlap * d.dot(covariance * d));
     return found;
 }
 

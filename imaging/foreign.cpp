@@ -13,6 +13,9 @@ constexpr double dark_line = 0.5;   // a crack below its ring, of the contrast
 constexpr double light_line = 0.33; // a ray above its ring, of the contrast
 constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than white light
 constexpr double too_green = 0.04; // green above red and blue
+constexpr double blank_black = 0.08, blank_white = 0.92;  // of the brightest in the picture, in each colour
+constexpr double blank_grain = 0.012;                     // largest standard deviation over a few pixels: wood has more
+constexpr double least_blank = 0.0005;                    // of the picture
 
 double number(Feature feature) { return static_cast<double>(feature); }
 
@@ -81,7 +84,39 @@ cv::Mat find_background(const cv::Mat& strange, double ring_width) {
     return background;
 }
 
+/// The darkest or the brightest colour of each pixel; the gray itself in a gray picture.
+cv::Mat extreme_colour(const cv::Mat& gray, const cv::Mat& bgr, bool brightest) {
+    if (bgr.empty())
+        return gray;
+    cv::Mat channel[3];
+    cv::split(bgr, channel);
+    return brightest ? cv::max(channel[0], cv::max(channel[1], channel[2])) : cv::min(channel[0], cv::min(channel[1], channel[2]));
+}
+
 }  // namespace
+
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
+    cv::Mat mean, squares;
+    cv::blur(gray, mean, {5, 5});
+    cv::blur(gray.mul(gray), squares, {5, 5});
+    const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
+    cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
+    for (const bool black : {true, false}) {
+        const cv::Mat colour = extreme_colour(gray, bgr, black);
+        cv::Mat plain = even & (black ? cv::Mat(colour < blank_black) : cv::Mat(colour > blank_white));
+        cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
+        const cv::Size size = plain.size();
+        blank |= pick(plain, [&](const int* box) {
+            const bool left = box[cv::CC_STAT_LEFT] <= 4, top = box[cv::CC_STAT_TOP] <= 4;
+            const bool right = box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] >= size.width - 4;
+            const bool bottom = box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] >= size.height - 4;
+            return (left || right) && (top || bottom) && box[cv::CC_STAT_AREA] > least_blank * static_cast<double>(size.area());
+        });
+    }
+    if (cv::countNonZero(blank) > 0)
+        cv::dilate(blank, blank, disk(4));  // its blurred rim
+    return blank;
+}
 
 cv::Mat find_foreign(const WoodView& view) {
     const auto& [gray, bgr, around, levels, width] = view;
@@ -103,6 +138,11 @@ cv::Mat find_foreign(const WoodView& view) {
     cv::Mat features(gray.size(), CV_8U, cv::Scalar(number(Feature::wood)));
     const cv::Mat patches = ((smooth < dark) | hue) & (background == 0);
     features.setTo(number(Feature::mark), pick(patches, [](const int* box) { return box[cv::CC_STAT_AREA] >= 4; }));
+    features.setTo(number(Feature::resin_canal), pick(smooth > around + light_line * contrast, [&](const int* box) {
+        const double length = std::max(box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]);
+        const double across = std::min(box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]);
+        return across >= 3 && length < 1.8 * across && length < 0.2 * width && box[cv::CC_STAT_AREA] > 0.5 * length * across;
+    }));
     features.setTo(number(Feature::ray), lines(smooth > around + light_line * contrast, 0.15));
     features.setTo(number(Feature::crack), lines(smooth < around - dark_line * contrast, 0.4));
     features.setTo(number(Feature::background), background);

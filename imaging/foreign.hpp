@@ -16,12 +16,17 @@ struct WoodView {
     double ring_width;      // [pixels]
 };
 
+/// 255 where the picture shows an even black or white that reaches in from one of its corners: what lies around a specimen on a scanner or a
+/// table. Known before anything about the wood is. `gray` and `bgr` as in a view.
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr);
+
 /// What in a picture is no plain wood, as a map of `Feature` numbers:
 /// - background: too dark for wood, or green or blue, and connected to the picture's edge; islands in it, too
 /// - crack: a thin line across the rings, darker than its ring around it by half the contrast of LW to EW
 /// - ray: the same, lighter by a third
+/// - resin canal: a round spot that is lighter by a third, up to a fifth of a ring wide
 /// - mark: other patches that are too dark, or blue or green: ink, holes, dirt
-/// Too dark is darker than LW by a quarter of the contrast. Light background is not told from wood.
+/// Too dark is darker than LW by a quarter of the contrast.
 cv::Mat find_foreign(const WoodView& view);
 
 /// 1 where a pixel is wood that counts (float): not foreign, and not right beside it.

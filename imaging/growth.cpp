@@ -15,9 +15,9 @@ constexpr double plain_skewness = 0.15;  // of the steps' cubes, -1..1
 constexpr double plain_spread = 0.05;    // of the radial direction across the picture [rad]
 
 /// Sum of the cubes of gray's steps down the straightened columns, over that of their sizes.
-double step_skewness(const cv::Mat& gray, const RingCoordinate& rings) {
+double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
     const StraightPicture straight =
-        straighten(gray, cv::Mat::ones(gray.size(), CV_32F), rings, std::clamp(gray.cols / 60.0, 1.0, 20.0));
+        straighten(gray, valid, rings, std::clamp(gray.cols / 60.0, 1.0, 20.0));
     cv::Mat smooth, slope, unknown;
     cv::GaussianBlur(straight.gray, smooth, {1, 0}, 1.5, 1.5);
     cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
@@ -73,11 +73,11 @@ const char* name(GrowthAxis growth) {
     throw std::logic_error("a growth without a name");
 }
 
-GrowthGuess guess_growth(const cv::Mat& gray, const OrientationField& field) {
+GrowthGuess guess_growth(const cv::Mat& gray, const cv::Mat& valid, const OrientationField& field) {
     const bool across = cv::sum(field.cos2.mul(field.coherency))[0] > 0;
     const GrowthAxis with = across ? GrowthAxis::right : GrowthAxis::up, against = across ? GrowthAxis::left : GrowthAxis::down;
     const GrowthFrame frame(with, gray.size());
-    const double skewness = step_skewness(frame.turn(gray), RingCoordinate(field, frame));
+    const double skewness = step_skewness(frame.turn(gray), frame.turn(valid), RingCoordinate(field, frame));
     if (std::abs(skewness) > plain_skewness)
         return {skewness > 0 ? with : against, fmt::format("LW's sharper side (skewness {:.2f})", std::abs(skewness))};
     const double turned = spread(field, frame);

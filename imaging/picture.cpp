@@ -161,6 +161,27 @@ void grade_transition(const Scene& scene, Specimen& specimen) {
     }
 }
 
+/// Wood whose density the specimen knows lies between EW and LW by it, and its constants follow by the exponents of density.
+void grade_by_density(const Scene& scene, Specimen& specimen) {
+    if (specimen.density.empty()) {
+        return;
+    }
+    const auto early = scene.materials.find("EW"), late = scene.materials.find("LW");
+    if (early == scene.materials.end() || late == scene.materials.end() || !(late->second.density > early->second.density)) {
+        throw InputError(scene.file.string(), "specimen.file", scene.specimen.file.string(),
+                         "has a map of density: the materials EW and LW are needed, LW the denser");
+    }
+    specimen.classes = {"EW", "LW"};
+    specimen.grade.assign(specimen.label.size(), 0.0f);
+    for (std::size_t i = 0; i < specimen.label.size(); ++i) {
+        if (specimen.label[i] != Specimen::void_label) {
+            const double grade = (specimen.density[i] - early->second.density) / (late->second.density - early->second.density);
+            specimen.label[i] = grade >= 1.0 ? 1 : 0;
+            specimen.grade[i] = grade >= 1.0 ? 0.0f : static_cast<float>(std::max(grade, 0.0));
+        }
+    }
+}
+
 void require_materials(const Scene& scene, const Specimen& specimen, const std::string& key) {
     for (const std::string& name : specimen.classes) {
         if (!scene.materials.contains(name)) {
@@ -185,6 +206,7 @@ void load_specimen(Scene& scene) {
             throw InputError(scene.file.string(), "specimen.file", plan.file.string(),
                              "has no scale: segment its picture again with --pixel");
         }
+        grade_by_density(scene, specimen);
         grade_transition(scene, specimen);
         require_materials(scene, specimen, "specimen.file");
         plan.map = std::make_shared<const Specimen>(std::move(specimen));

@@ -39,6 +39,7 @@ void draw_features(cv::Mat& picture, const Specimen& specimen) {
     tint(picture, feature == static_cast<double>(Feature::crack), {255, 0, 255});
     tint(picture, feature == static_cast<double>(Feature::mark), {0, 255, 255});
     tint(picture, feature == static_cast<double>(Feature::ray), {0, 160, 0});
+    tint(picture, feature == static_cast<double>(Feature::resin_canal), {255, 0, 0});
 }
 
 void draw_borders(cv::Mat& picture, const Specimen& specimen, int thickness) {

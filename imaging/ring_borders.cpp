@@ -37,7 +37,7 @@ struct Profile {
     int column = 0;
     std::vector<float> gray;
     std::vector<char> known;
-    double first = 0, last = 0;  // rows at which the picture begins and ends
+    double first = 0, last = 0;  // rows at which what is photographed begins and ends; none where first > last
 };
 
 /// A rise of gray in a profile.
@@ -47,12 +47,16 @@ struct Rise {
     double room = 0;    // to the nearest other rise
 };
 
-Profile take_profile(const StraightPicture& straight, const RingCoordinate& rings, int column, double sigma,
-                     int frame_rows) {
+Profile take_profile(const StraightPicture& straight, const RingCoordinate& rings, int column, double sigma, const cv::Mat& blank) {
     Profile profile;
     profile.column = column;
-    profile.first = rings.psi(column, 0) - rings.lowest();
-    profile.last = rings.psi(column, frame_rows - 1) - rings.lowest();
+    int top = 0, bottom = blank.rows - 1;
+    while (top < blank.rows && blank.at<std::uint8_t>(top, column))
+        ++top;
+    while (bottom > top && blank.at<std::uint8_t>(bottom, column))
+        --bottom;
+    profile.first = rings.psi(column, top) - rings.lowest();
+    profile.last = rings.psi(column, bottom) - rings.lowest();
     cv::Mat gray, known;
     const cv::Mat weight = straight.known.col(column).clone();
     cv::GaussianBlur(straight.gray.col(column).mul(weight), gray, {1, 0}, sigma, sigma, cv::BORDER_CONSTANT);
@@ -271,7 +275,8 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, 
                 gain.at<float>(j, u) = std::max(0.0f, slope.at<float>(row, u));
         double peak = 0;
         cv::minMaxLoc(gain.col(u), nullptr, &peak);
-        peaks.push_back(static_cast<float>(peak));
+        if (peak > 0)  // else there is nothing in this column, such as beside a specimen that is narrower than its picture
+            peaks.push_back(static_cast<float>(peak));
     }
     gain /= std::max(quantile(peaks, 0.5), 1e-6);
     cv::min(gain, 1.5, gain);
@@ -292,7 +297,7 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, 
 }
 
 /// Profiles across the rings, each a blurred stretch of them apart.
-std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                    double ring_width) {
     const double most = ring_width > 0 ? std::max(2.0, 0.4 * ring_width) : 20;
     const double along = std::clamp(gray.cols / 60.0, 1.0, most);
@@ -302,7 +307,7 @@ std::vector<Profile> take_profiles(const cv::Mat& gray, const cv::Mat& valid, co
     std::vector<Profile> profiles;
     for (int k = 0; k < count; ++k)
         profiles.push_back(
-            take_profile(straight, rings, static_cast<int>((k + 0.5) * gray.cols / count), across, gray.rows));
+            take_profile(straight, rings, static_cast<int>((k + 0.5) * gray.cols / count), across, blank));
     return profiles;
 }
 
@@ -384,9 +389,9 @@ StraightPicture straighten(const cv::Mat& gray, const cv::Mat& valid, const Ring
     return straight;
 }
 
-std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                           double ring_width) {
-    const std::vector<Profile> profiles = take_profiles(gray, valid, rings, ring_width);
+    const std::vector<Profile> profiles = take_profiles(gray, valid, blank, rings, ring_width);
     const std::vector<Track> tracks = keep(follow(profiles, ring_width), profiles);
     return lay_borders(gray, valid, rings, tracks, profiles.size());
 }

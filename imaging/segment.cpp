@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 #include "imaging/flatten.hpp"
 #include "imaging/foreign.hpp"
+#include "imaging/gray_picture.hpp"
 #include "imaging/growth.hpp"
 #include "imaging/pixels.hpp"
 #include "imaging/resolution_tag.hpp"
@@ -12,7 +13,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 namespace crampfit {
@@ -28,8 +31,7 @@ struct Pixels {
     cv::Mat bgr;  // empty: the picture is gray
 };
 
-Pixels read_float(const std::filesystem::path& image) {
-    const PictureKey key{"command line", "IMAGE"};
+Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
     const auto fail = [&](const std::string& rule) { throw InputError(key.file, key.key, image.string(), rule); };
     const cv::Mat stored = read_pixels(image, key);
     if (std::min(stored.rows, stored.cols) < least_side)
@@ -94,7 +96,8 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
     return lines;
 }
 
-Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const GrowthFrame& frame,
+/// `blank` is what is no specimen whatever else is found.
+Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const cv::Mat& valid, const GrowthFrame& frame,
            const OrientationScale& scale, double ring_width, const std::vector<BorderPolyline>& given) {
     Round round;
     cv::Mat counts;
@@ -105,22 +108,30 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& valid, const 
     if (!given.empty())
         round.borders = lines_of(given, frame);
     else if (round.obstacle.empty())
-        round.borders = find_ring_borders(gray, valid, rings, ring_width);
+        round.borders = find_ring_borders(gray, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;
     round.degree = density_degree(gray, valid, rings, round.borders, width, levels);
     if (round.borders.empty()) {  // then it is not known how dark LW is
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
-        return round;
+    } else {
+        const cv::Mat around = rings.bend(straighten(gray, valid, rings, std::max(8.0, 0.5 * width)).gray);
+        round.features = find_foreign({gray, bgr, around, levels, width});
     }
-    const cv::Mat around = rings.bend(straighten(gray, valid, rings, std::max(8.0, 0.5 * width)).gray);
-    round.features = find_foreign({gray, bgr, around, levels, width});
+    round.features.setTo(static_cast<double>(Feature::background), blank);
     return round;
 }
 
-GrowthAxis growth_of(const cv::Mat& gray, const SegmentOptions& options, std::vector<std::string>& notes) {
-    const GrowthGuess guess = guess_growth(gray, measure_orientation(gray, {}, first_scale(gray.size())));
+/// 1 where a pixel is not blank, float.
+cv::Mat shown(const cv::Mat& blank) {
+    cv::Mat counts;
+    cv::Mat(blank == 0).convertTo(counts, CV_32F, 1.0 / 255);
+    return counts;
+}
+
+GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const SegmentOptions& options, std::vector<std::string>& notes) {
+    const GrowthGuess guess = guess_growth(gray, shown(blank), measure_orientation(gray, blank == 0, first_scale(gray.size())));
     if (!options.growth) {
         notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
         return guess.growth;
@@ -133,7 +144,7 @@ GrowthAxis growth_of(const cv::Mat& gray, const SegmentOptions& options, std::ve
 
 double pixel_of(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& notes) {
     if (options.pixel > 0) {
-        notes.push_back(fmt::format("scale: {:.6g} um a pixel, from --pixel", 1e6 * options.pixel));
+        notes.push_back(fmt::format("scale: {:.6g} um a pixel, from {}", 1e6 * options.pixel, options.pixel_from));
         return options.pixel;
     }
     if (const double tagged = pixel_by_tag(image); tagged > 0) {
@@ -168,6 +179,50 @@ void fill_maps(Specimen& specimen, const Round& round, const cv::Mat& classes, c
         }
 }
 
+/// Classes from bright to dark by the picture's own gray; void where it lies in no range.
+cv::Mat classes_by_gray(const std::filesystem::path& image, std::vector<GrayClass> ranges, std::vector<std::string>& names) {
+    std::ranges::sort(ranges, std::greater{}, &GrayClass::low);
+    std::array<std::uint8_t, 256> meaning;
+    meaning.fill(Specimen::void_label);
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+        names.push_back(ranges[i].material);
+        std::fill(meaning.begin() + ranges[i].low, meaning.begin() + ranges[i].high + 1, static_cast<std::uint8_t>(i));
+    }
+    const GrayPicture gray = read_gray(image, {"command line", "IMAGE"});
+    cv::Mat classes(gray.rows, gray.columns, CV_8U);
+    std::ranges::transform(gray.gray, classes.begin<std::uint8_t>(), [&](std::uint8_t value) { return meaning[value]; });
+    return classes;
+}
+
+/// The radial direction as another picture of the wood shows it.
+OrientationField orientation_in(const std::filesystem::path& image, cv::Size size, const OrientationScale& scale) {
+    const PictureKey key{"command line", "--direction"};
+    const Pixels pixels = read_float(image, key);
+    if (pixels.gray.size() != size)
+        throw InputError(key.file, key.key, image.string(),
+                         fmt::format("is {} x {} pixels, the picture {} x {}: must have its size", pixels.gray.cols, pixels.gray.rows, size.width,
+                                     size.height));
+    return measure_orientation(pixels.gray, find_blank(pixels.gray, pixels.bgr) == 0, scale);
+}
+
+void fill_density(Specimen& specimen, const std::filesystem::path& image, const DensityTable& table, std::vector<std::string>& notes) {
+    const FinePicture gray = read_fine_gray(image, {"command line", "IMAGE"});
+    std::vector<double> sum(specimen.classes.size(), 0.0);
+    std::vector<long> count(sum.size(), 0);
+    for (std::size_t i = 0; i < specimen.label.size(); ++i) {
+        const std::uint8_t label = specimen.label[i];
+        const double density = label == Specimen::void_label ? 0.0 : table.at(gray.gray[i]);
+        specimen.density.push_back(static_cast<float>(density));
+        if (label != Specimen::void_label) {
+            sum[label] += density;
+            ++count[label];
+        }
+    }
+    for (std::size_t k = 0; k < sum.size(); ++k)
+        if (count[k] > 0)
+            notes.push_back(fmt::format("density of {}: {:.0f} kg/m^3 on average", specimen.classes[k], sum[k] / static_cast<double>(count[k])));
+}
+
 }  // namespace
 
 void SegmentOptions::validate() const {
@@ -177,34 +232,50 @@ void SegmentOptions::validate() const {
     };
     require(pixel >= 0 && std::isfinite(pixel), "--pixel", fmt::format("{} m", pixel), "must be a positive length");
     require(classes == 2 || classes == 3, "--classes", std::to_string(classes), "must be 2 or 3");
+    for (const GrayClass& range : gray) {
+        const std::string text = fmt::format("{} {}-{}", range.material, range.low, range.high);
+        require(range.low >= 0 && range.low <= range.high && range.high <= 255, "--gray", text, "must be 0 <= low <= high <= 255");
+        for (const GrayClass& other : gray)
+            require(&other == &range || range.high < other.low || other.high < range.low, "--gray", text, "ranges must not overlap");
+    }
 }
 
 Segmentation segment(const std::filesystem::path& image, const SegmentOptions& options) {
     options.validate();
     Segmentation result;
-    Pixels pixels = read_float(image);
+    const PictureKey key{"command line", "IMAGE"};
+    const Pixels pixels = read_float(image, key);
     Specimen& specimen = result.specimen;
     specimen.columns = pixels.gray.cols;
     specimen.rows = pixels.gray.rows;
     specimen.source = image.string();
     specimen.pixel = pixel_of(image, options, result.notes);
-    specimen.classes = options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"}
-                                            : std::vector<std::string>{"EW", "LW"};
-
-    const GrowthFrame frame(growth_of(pixels.gray, options, result.notes), pixels.gray.size());
+    const cv::Mat blank = find_blank(pixels.gray, pixels.bgr);
+    const GrowthFrame frame(growth_of(pixels.gray, blank, options, result.notes), pixels.gray.size());
     const cv::Mat gray = frame.turn(pixels.gray), bgr = pixels.bgr.empty() ? cv::Mat() : frame.turn(pixels.bgr);
-    const Round first =
-        look(gray, bgr, cv::Mat::ones(gray.size(), CV_32F), frame, first_scale(gray.size()), 0, options.borders);
+    const cv::Mat off = frame.turn(blank);
+    const Round first = look(gray, bgr, off, shown(off), frame, first_scale(gray.size()), 0, options.borders);
     const cv::Mat valid = countable(first.features);
-    const Round second = look(flatten(gray, valid), bgr, valid, frame, scale_for(first.ring_width, gray.size()),
-                              first.ring_width, options.borders);
+    Round second = look(flatten(gray, valid), bgr, off, valid, frame, scale_for(first.ring_width, gray.size()), first.ring_width,
+                        options.borders);
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
-    const cv::Mat classes = classify(second.degree, options.classes, width);
+    cv::Mat classes;
+    if (options.gray.empty()) {
+        specimen.classes = options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"}
+                                                : std::vector<std::string>{"EW", "LW"};
+        classes = classify(second.degree, options.classes, width);
+    } else {
+        classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
+    }
+    if (!options.direction.empty())
+        second.orientation = orientation_in(options.direction, pixels.gray.size(), scale_for(first.ring_width, gray.size()));
     fill_maps(specimen, second, classes, frame);
+    if (options.density)
+        fill_density(specimen, image, *options.density, result.notes);
     for (std::size_t i = 0; i < second.borders.size(); ++i)
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
-    specimen.rings = ring_figures(second.borders, classes, options.classes - 1, second.features);
+    specimen.rings = ring_figures(second.borders, classes, static_cast<int>(specimen.classes.size()) - 1, second.features);
     if (!second.obstacle.empty() && options.borders.empty())
         result.notes.push_back(second.obstacle);
     result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",

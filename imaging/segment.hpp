@@ -1,5 +1,7 @@
 #pragma once
 
+#include "datasets/density_table.hpp"
+#include "datasets/scene.hpp"
 #include "datasets/specimen.hpp"
 #include "imaging/growth_axis.hpp"
 
@@ -12,9 +14,13 @@ namespace crampfit {
 
 struct SegmentOptions {
     double pixel = 0;              // edge of a pixel [m]; 0: from the file's resolution tag, where there is one
+    std::string pixel_from = "--pixel";  // what it was told by, for the notes
     int classes = 2;               // 2: EW, LW; 3: EW, transition, LW
     std::optional<GrowthAxis> growth = std::nullopt;  // from pith to bark; none: told from the picture
     std::vector<BorderPolyline> borders = {};  // corrected by hand; empty: found
+    std::vector<GrayClass> gray = {};          // classes by the picture's own gray; empty: by each ring's; grays in no range are void
+    std::optional<DensityTable> density = std::nullopt;  // what the picture's own gray stands for
+    std::filesystem::path direction = {};      // picture of the same wood, as large, that the radial direction is seen in; empty: the same
 
     /// Throws InputError for anything out of range.
     void validate() const;

@@ -85,14 +85,14 @@ GrayPicture VirtualCamera::photograph(std::uint64_t shot) const {
     return photograph([](const Vec2&) { return Vec2(0, 0); }, shot);
 }
 
-GrayPicture VirtualCamera::photograph(const PlaneDisplacement& displacement, std::uint64_t shot) const {
+GrayPicture VirtualCamera::photograph(const PlaneDisplacement& displacement, std::uint64_t shot, const Coverage& covered) const {
     const RandomField random(options_.seed);
     GrayPicture picture{options_.columns, options_.rows, {}};
     for (int y = 0; y < options_.rows; ++y)
         for (int x = 0; x < options_.columns; ++x) {
             const std::optional<Vec2> origin = origin_of(Vec2(x, y), displacement);
             const double noise = options_.noise * random.normal(first_noise + shot, picture.gray.size());
-            const double gray = (origin ? pattern(*origin) : options_.gap_gray) + noise;
+            const double gray = (origin && (!covered || covered(*origin)) ? pattern(*origin) : options_.gap_gray) + noise;
             picture.gray.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(gray, 0.0, 255.0))));
         }
     return picture;

@@ -27,6 +27,9 @@ struct VirtualCameraOptions {
 /// Displacement of the material point that lies at a place of the reference picture [px].
 using PlaneDisplacement = std::function<Vec2(const Vec2&)>;
 
+/// Whether there is material at a place of the reference picture [px]; empty: everywhere.
+using Coverage = std::function<bool(const Vec2&)>;
+
 /// Photographs a speckle pattern that moves with a given displacement. The pattern is a sum of Gaussian spots at random
 /// places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and
 /// the rounding to whole grays.
@@ -38,8 +41,9 @@ class VirtualCamera {
     /// The picture of the pattern at rest; `shot` numbers the picture: another number, other noise.
     GrayPicture photograph(std::uint64_t shot) const;
 
-    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1.
-    GrayPicture photograph(const PlaneDisplacement& displacement, std::uint64_t shot) const;
+    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1. Places of the
+    /// reference that `covered` says no to are no material, and show `gap_gray`.
+    GrayPicture photograph(const PlaneDisplacement& displacement, std::uint64_t shot, const Coverage& covered = {}) const;
 
   private:
     struct Spot {

@@ -70,6 +70,23 @@ double scatter(const Curve& rows) {
 }  // namespace
 
 Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
+    if (experiment.fields) {
+        fields_.emplace(experiment);
+        remarks_.push_back(fields_->remark());
+    }
+    if (!fields_ || measured(experiment.data.force) || measured(experiment.data.crack_length)) {
+        add_curves(experiment);
+    }
+    if (fields_) {
+        stations_.insert(stations_.end(), fields_->stations().begin(), fields_->stations().end());
+    }
+    if (stations_.empty()) {
+        throw bad_data(experiment, "crack_length", "constant",
+                       "must grow by more than its noise, as there is no force to compare");
+    }
+}
+
+void Comparison::add_curves(const Experiment& experiment) {
     const Curves& data = experiment.data;
     by_time_ = !measured(data.displacement);
     if (by_time_ && !measured(data.time)) {
@@ -88,10 +105,6 @@ Comparison::Comparison(const Experiment& experiment, double model_resolution) : 
     }
     if (measured(data.crack_length)) {
         add_arrival_stations(experiment);
-    }
-    if (stations_.empty()) {
-        throw bad_data(experiment, "crack_length", "constant",
-                       "must grow by more than its noise, as there is no force to compare");
     }
 }
 
@@ -209,6 +222,15 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
 }
 
 Eigen::VectorXd Comparison::modelled(const Record& record) const {
+    std::vector<double> values = fields_ && fields_->stations().size() == stations_.size() ? std::vector<double>{} : on_curves(record);
+    if (fields_) {
+        const std::vector<double> of_fields = fields_->modelled(record);
+        values.insert(values.end(), of_fields.begin(), of_fields.end());
+    }
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+std::vector<double> Comparison::on_curves(const Record& record) const {
     std::vector<double> abscissa, forces, lengths;
     for (const Instant& instant : record.series) {
         abscissa.push_back(by_time_ ? instant.time : instant.displacement);
@@ -230,14 +252,12 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
     }
     const Curve crack = Curve(abscissa, lengths).smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());
-    Eigen::VectorXd values(static_cast<Eigen::Index>(stations_.size()));
-    for (std::size_t i = 0; i < stations_.size(); ++i) {
-        const FitResidual& station = stations_[i];
-        double& value = values[static_cast<Eigen::Index>(i)];
+    std::vector<double> values;
+    for (const FitResidual& station : stations_) {
         if (station.kind == "force") {
-            value = force_at(force, station.at);
-        } else {
-            value = crack.arrival(station.at).value_or(end + pace_ * (station.at - longest));
+            values.push_back(force_at(force, station.at));
+        } else if (station.kind == "arrival") {
+            values.push_back(crack.arrival(station.at).value_or(end + pace_ * (station.at - longest)));
         }
     }
     return values;

@@ -3,6 +3,7 @@
 #include "datasets/experiment.hpp"
 #include "datasets/fit.hpp"
 #include "datasets/record.hpp"
+#include "inverse/field_comparison.hpp"
 
 #include <Eigen/Core>
 
@@ -51,6 +52,8 @@ class Comparison {
     const std::vector<std::string>& remarks() const { return remarks_; }
 
   private:
+    void add_curves(const Experiment& experiment);
+    std::vector<double> on_curves(const Record& record) const;
     void add_force_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment);
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows,
@@ -68,7 +71,8 @@ class Comparison {
     double arrival_window_ = 0;  // of the average of crack length [m] or [s]
     double arrival_end_ = 0;     // of the measured crack lengths
     double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
-    std::vector<FitResidual> stations_;
+    std::optional<FieldComparison> fields_;
+    std::vector<FitResidual> stations_;  // of the curves, then of the fields
     std::vector<std::string> remarks_;
 };
 

@@ -41,7 +41,8 @@ void check_experiment(const Study& study, const Experiment& experiment, std::siz
     const std::pair<const char*, std::optional<double>> sigmas[] = {{"force", noise.force},
                                                                     {"crack_length", noise.crack_length},
                                                                     {"displacement", noise.displacement},
-                                                                    {"time", noise.time}};
+                                                                    {"time", noise.time},
+                                                                    {"displacement_field", noise.displacement_field}};
     for (const auto& [column, sigma] : sigmas) {
         require(!sigma || (std::isfinite(*sigma) && *sigma > 0), study, at + "noise." + column, text(sigma.value_or(0)),
                 "must be positive; leave it out to have it estimated");

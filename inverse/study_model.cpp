@@ -85,7 +85,7 @@ Evaluation StudyModel::evaluate(const Eigen::VectorXd& x, int threads) const {
 std::vector<int> StudyModel::curve_lengths() const {
     std::vector<int> lengths;
     for (const Comparison& comparison : comparisons_) {
-        for (const char* kind : {"force", "arrival"}) {
+        for (const char* kind : {"force", "arrival", "u_x", "u_y"}) {
             const auto count = std::count_if(comparison.stations().begin(), comparison.stations().end(),
                                              [kind](const FitResidual& station) { return station.kind == kind; });
             if (count > 0) {

@@ -174,7 +174,12 @@ TEST(SystemTrack, BadTimesAndLoad) {
     refused({"--times", file("two.csv", "time [s]\n1\n2\n")}, "2 rows");
     refused({"--times", file("force.csv", "force [N]\n1\n")}, "0 rows");
     const std::string times = file("times.csv", "time [s]\n1\n");
-    refused({"--load", file("load.csv", "time [s],force [N]\n0,1\n2,1\n")}, "--times");
+    const std::string rising = file("load.csv", "time [s],force [N]\n0,1\n2,1\n");
+    refused({"--load", rising}, "--times");
+    refused({"--times", times, "--offset", "1 s"}, "--load");
+    refused({"--times", times, "--load", rising, "--offset", "1"}, "--offset");
+    refused({"--times", times, "--load", rising, "--offset", "1 s", "--trigger", "1 s"}, "--offset");
+    refused({"--times", file("both.csv", "time [s],force [N]\n1,0.5\n"), "--load", rising}, "must change");
     refused({"--times", times, "--load", file("fall.csv", "time [s],force [N]\n2,1\n0,1\n")}, "must rise");
     refused({"--times", times, "--load", file("bare.csv", "time [s]\n0\n2\n")}, "displacement or force");
     refused({"--times", times, "--load", file("late.csv", "force [N]\n0\n2\n")}, "needs its time");

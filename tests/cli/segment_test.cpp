@@ -107,3 +107,31 @@ TEST(SystemSegment, BadUseIsNamedAndLeavesNothing) {
     EXPECT_EQ(none.status, 2);
     EXPECT_TRUE(contains(none.error, "no such file"));
 }
+
+TEST(SystemSegment, ScaleGraysAndDensityAsTold) {
+    Command command;
+    const std::string specimen = command.path("s.h5");
+    const Outcome made = command.run({"segment", picture, "-o", specimen, "--scale", "0,0 300,400 = 12.5 mm"});
+    ASSERT_EQ(made.status, 0) << made.error;
+    EXPECT_TRUE(contains(made.error, "25 um a pixel, from two points")) << made.error;
+    const std::string table = command.folder.write("wedge.csv", "gray,density [kg/m^3]\n0,1200\n255,200\n").string();
+    const Outcome dense = command.run({"segment", "--gray", "EW 128-255", "--gray", "LW 0-127", picture, "-o", specimen, "--pixel", "25 um", "--density", table});
+    ASSERT_EQ(dense.status, 0) << dense.error;
+    EXPECT_TRUE(contains(dense.error, "density of LW")) << dense.error;
+    EXPECT_EQ(read_specimen(specimen).density.size(), read_specimen(specimen).label.size());
+    const auto refused = [&](const std::vector<std::string>& more, const std::string& phrase) {
+        std::vector<std::string> words{"segment", picture, "-o", specimen};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << phrase;
+        EXPECT_TRUE(contains(outcome.error, phrase)) << outcome.error;
+    };
+    for (const char* bad : {"0,0 300,400", "0,0 300,400 = 12.5", "0,0 0,0 = 1 mm", "0,0 3 = 1 mm", "0,0 300,400 = -1 mm", "0,0 1e999,1 = 1 mm"})
+        refused({"--scale", bad}, "--scale");
+    refused({"--scale", "0,0 1,1 = 1 mm", "--pixel", "1 mm"}, "--pixel");
+    for (const char* bad : {"EW", "EW 1", "EW 1-", "EW 1:2", "EW 1-2 3", "EW 200-100", "EW 0-256"})
+        refused({"--gray", bad}, "--gray");
+    refused({"--gray", "EW 0-100", "--gray", "LW 100-200"}, "overlap");
+    refused({"--density", command.path("none.csv")}, "none.csv");
+    refused({"--direction", command.path("none.png")}, "none.png");
+}

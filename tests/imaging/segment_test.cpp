@@ -242,8 +242,9 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
 }
 
 // Bars: all 25 borders, none invented, median 3 and worst 8 px from the given ones; ring widths within 3 %. The given
-// ones are whole pixels on one row, ours are means over the core's height: one ring of 24, the narrowest (45 px, its LW
-// stained), misses the last bar by half a percent, so the mean over the rings is gated and the worst is printed.
+// ones are whole pixels on one row, ours are means over the core's height. One ring of 24, the narrowest (45 px), misses the last bar by half a
+// percent: over a third of the height a stain stands in front of its LW, as dark as half of it, and the border follows the stain's edge by up
+// to 5 px. By gray a stain is no different from a ring that waves; so the mean over the rings is gated and the worst is printed.
 TEST(VerificationSegment, IncrementCore) {
     const auto image = wood / "mtreering_001.png";
     std::ifstream table(wood / "mtreering_001_ring_borders.csv");

@@ -1,0 +1,123 @@
+#include "cli/progress.hpp"
+#include "cli/stop.hpp"
+#include "cli/verbs.hpp"
+#include "datasets/error.hpp"
+#include "datasets/limits.hpp"
+#include "datasets/record_file.hpp"
+#include "datasets/whole_file.hpp"
+#include "imaging/record_camera.hpp"
+#include "inverse/pool.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <mutex>
+
+namespace crampfit::cli {
+
+namespace {
+
+struct Arguments {
+    std::filesystem::path record, folder;
+    std::string pixel, margin = "0 mm";
+    VirtualCameraOptions options{.columns = 1, .rows = 1};
+};
+
+double length_of(const std::string& text, const NumberRule& rule, const char* option) {
+    const double value = parse_quantity(text, rule.dimension, {"command line", option});
+    if (!rule.allows(value))
+        throw InputError("command line", option, text, rule.rule);
+    return value;
+}
+
+/// The row of the series at a frame's time.
+const Instant& row_of(const Record& record, const Frame& frame) {
+    const auto after = std::ranges::lower_bound(record.series, frame.time, {}, &Instant::time);
+    return after == record.series.end() ? record.series.back() : *after;
+}
+
+/// What the load cell and the transducer said at each picture, as `--times` and `--load` take it.
+Curves load_of(const Record& record) {
+    Curves curves;
+    for (const Frame& frame : record.frames) {
+        curves.time.push_back(frame.time);
+        curves.displacement.push_back(frame.displacement);
+        curves.force.push_back(row_of(record, frame).force);
+    }
+    return curves;
+}
+
+/// The tip as `crampfit track` counts it.
+std::string truth_of(const Record& record, const CameraView& view) {
+    std::string text = "image,time_s,tip_x_px,tip_y_px,crack_length_m\n";
+    for (std::size_t i = 0; i < record.frames.size(); ++i) {
+        const Instant& row = row_of(record, record.frames[i]);
+        const Vec2 tip = view.to_picture(row.tip);
+        text += fmt::format("{},{:.9g},{:.3f},{:.3f},{:.9g}\n", i, record.frames[i].time, tip.x(), tip.y(), row.crack_length);
+    }
+    return text;
+}
+
+std::filesystem::path make_folder(const std::filesystem::path& folder) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error || !std::filesystem::is_directory(folder))
+        throw InputError("command line", "--output", folder.string(), "must be a folder, or a name that one can be made under");
+    return folder;
+}
+
+ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
+    if (!common.settings.empty())
+        throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
+    const double pixel = length_of(arguments.pixel, limits::pixel, "--pixel");
+    const double margin = length_of(arguments.margin, limits::not_negative(dimension::length), "--margin");
+    arguments.options.validate();
+    const Record record = read_record(arguments.record);
+    const RecordCamera camera(record, arguments.record, pixel, margin, arguments.options);
+    const std::filesystem::path folder = make_folder(arguments.folder);
+    write_gray(camera.reference(), folder / "reference.png");
+    write_curves(load_of(record), folder / "load.csv");
+    if (record.series.front().crack_length > 0)
+        write_whole_file(folder / "truth.csv", truth_of(record, camera.view()));
+
+    stop_on_signals();
+    ProgressLine line(common, "pictures");
+    std::mutex mutex;
+    const int count = static_cast<int>(record.frames.size());
+    std::atomic<int> done = 0;
+    parallel_for(count, common.threads, [&](int frame) {
+        if (stop_requested())
+            return;
+        write_gray(camera.photograph(frame), folder / fmt::format("image_{:04}.png", frame));
+        const std::lock_guard lock(mutex);
+        ++done;
+        line.show(static_cast<double>(done) / count, done, "");
+    });
+    report(common, fmt::format("{} pictures beside reference.png in {}; the lower left corner lies at [\"{:g} mm\", \"{:g} mm\"] of the specimen",
+                               done.load(), folder.string(), 1e3 * camera.view().corner.x(), 1e3 * camera.view().corner.y()));
+    return done < count ? ExitStatus::interrupted : ExitStatus::done;
+}
+
+}  // namespace
+
+Verb camera_verb(CLI::App& command, const CommonOptions& common) {
+    auto arguments = std::make_shared<Arguments>();
+    CLI::App* verb = command.add_subcommand("camera", "Pictures that a camera would take of a simulated specimen");
+    VirtualCameraOptions& options = arguments->options;
+    verb->add_option("record", arguments->record, "A record with frames")->type_name("RECORD.h5")->required();
+    verb->add_option("-o,--output", arguments->folder, "Folder for reference.png, image_0000.png ..., load.csv and truth.csv")
+        ->type_name("FOLDER")
+        ->required();
+    verb->add_option("--pixel", arguments->pixel, "Edge of a pixel on the specimen, as in \"20 um\"")->type_name("LENGTH")->required();
+    verb->add_option("--margin", arguments->margin, "Of background around the specimen")->type_name("LENGTH")->capture_default_str();
+    verb->add_option("--noise", options.noise, "Standard deviation of each pixel's gray, of 255")->capture_default_str();
+    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str();
+    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str();
+    verb->add_option("--seed", options.seed, "Of the pattern and the noise")->capture_default_str();
+    return {verb, [arguments, &common] { return photograph(*arguments, common); }};
+}
+
+}  // namespace crampfit::cli

@@ -1,0 +1,136 @@
+#include "inverse/field_comparison.hpp"
+
+#include "datasets/error.hpp"
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace crampfit {
+namespace {
+
+double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
+    double least = INFINITY;
+    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+        const Vec2 along = line[k + 1] - line[k];
+        const double t = std::clamp((x - line[k]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+        least = std::min(least, (x - line[k] - t * along).norm());
+    }
+    return least;
+}
+
+// A small motion of the whole picture: a translation, and a turn about the origin.
+Eigen::Matrix<double, 2, 3> motion_at(const Vec2& place) {
+    Eigen::Matrix<double, 2, 3> rows;
+    rows << 1, 0, -place.y(), 0, 1, place.x();
+    return rows;
+}
+
+}  // namespace
+
+FieldComparison::FieldComparison(const Experiment& experiment) {
+    const MeasuredFields& fields = *experiment.fields;
+    places_ = fields.places;
+    weights_ = subset_weights(fields.order);
+    reach_ = fields.subset * std::numbers::sqrt2 / 2;
+    camera_moves_ = fields.camera_moves;
+    std::size_t followed = 0;
+    for (std::size_t k = 0; k < fields.instants.size(); ++k) {
+        std::vector<Point>& points = pictures_.emplace_back();
+        for (std::size_t i = 0; i < places_.size(); ++i) {
+            if (fields.moved[k][i].allFinite()) {
+                points.push_back({i, fields.moved[k][i], experiment.noise.displacement_field.value_or(fields.sigma[k][i])});
+                if (!(points.back().sigma > 0)) {
+                    throw InputError(fields.file.string(), fmt::format("sigma of image {}", k), fmt::format("{:g}", points.back().sigma),
+                                     "must be positive: give noise.displacement_field");
+                }
+            }
+        }
+        constexpr std::size_t least_points = 4;  // more numbers than a motion has
+        if (points.size() < least_points) {
+            points.clear();
+        }
+        followed += points.size();
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+        for (std::size_t k = 0; k < pictures_.size(); ++k) {
+            for (const Point& point : pictures_[k]) {
+                FitResidual station{.experiment = experiment.name, .kind = axis == 0 ? "u_x" : "u_y", .at = fields.instants[k]};
+                station.measured = point.measured[axis];
+                station.sigma = point.sigma;
+                stations_.push_back(station);
+            }
+        }
+    }
+    remark_ = fmt::format("{}: displacements of {} points in {} pictures are compared, {} with no pixel in common{}.", experiment.name, followed,
+                          fields.instants.size(), places_.size(),
+                          camera_moves_ ? "; each picture may have moved and turned as a whole" : "");
+}
+
+Vec2 FieldComparison::in_subset(std::size_t place, const ProbeReading& reading) const {
+    Vec2 mean = Vec2::Zero();
+    for (std::size_t k = 0; k < weights_.size(); ++k) {
+        mean += weights_[k] * reading.moved[weights_.size() * place + k];
+    }
+    return mean;
+}
+
+std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, const ProbeReading& reading) const {
+    std::vector<Vec2> values;
+    std::vector<double> share;  // of a point that counts
+    for (const Point& point : points) {
+        double nearest = INFINITY;
+        for (const std::vector<Vec2>& crack : reading.cracks) {
+            nearest = std::min(nearest, distance_to(crack, places_[point.place]));
+        }
+        const Vec2 value = in_subset(point.place, reading);
+        share.push_back(value.allFinite() ? std::clamp(nearest / reach_ - 1, 0.0, 1.0) : 0.0);
+        values.push_back(share.back() > 0 ? value : point.measured);
+    }
+    if (camera_moves_) {
+        move_with_camera(points, share, values);
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        values[i] = points[i].measured + share[i] * (values[i] - points[i].measured);
+    }
+    return values;
+}
+
+void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const auto rows = motion_at(places_[points[i].place] / reach_);
+        const double weight = std::pow(share[i] / points[i].sigma, 2);
+        normal += weight * rows.transpose() * rows;
+        right += weight * rows.transpose() * (points[i].measured - values[i]);
+    }
+    const Eigen::Vector3d motion = normal.completeOrthogonalDecomposition().solve(right);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        values[i] += motion_at(places_[points[i].place] / reach_) * motion;
+    }
+}
+
+std::vector<double> FieldComparison::modelled(const Record& record) const {
+    if (record.probes.size() != pictures_.size()) {
+        throw std::invalid_argument(fmt::format("the run read {} of {} displacement fields", record.probes.size(), pictures_.size()));
+    }
+    std::vector<Vec2> values;
+    for (std::size_t k = 0; k < pictures_.size(); ++k) {
+        const std::vector<Vec2> of_picture = modelled(pictures_[k], record.probes[k]);
+        values.insert(values.end(), of_picture.begin(), of_picture.end());
+    }
+    std::vector<double> all;
+    for (int axis = 0; axis < 2; ++axis) {
+        for (const Vec2& value : values) {
+            all.push_back(value[axis]);
+        }
+    }
+    return all;
+}
+
+}  // namespace crampfit

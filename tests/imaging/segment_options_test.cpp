@@ -1,0 +1,156 @@
+// What a user tells `segment` beside the picture, and specimens that do not fill theirs.
+#include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "imaging/end_grain.hpp"
+#include "imaging/picture.hpp"
+#include "imaging/segment.hpp"
+#include "tests/temporary_folder.hpp"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <cmath>
+#include <cstdio>
+
+using namespace crampfit;
+
+namespace {
+
+cv::Mat picture_of(const EndGrain& grown) {
+    return cv::Mat(grown.rows, grown.columns, CV_8UC3, const_cast<std::uint8_t*>(grown.bgr.data())).clone();
+}
+
+Segmentation segment_pixels(const cv::Mat& pixels, const SegmentOptions& options = {}) {
+    const TemporaryFolder folder;
+    EXPECT_TRUE(cv::imwrite((folder / "a.png").string(), pixels));
+    return segment(folder / "a.png", options);
+}
+
+/// The picture turned about its middle, on an even ground that is larger than it.
+cv::Mat turned_on(const cv::Mat& pixels, double degrees, const cv::Scalar& ground) {
+    const cv::Point2d middle(0.5 * (pixels.cols - 1), 0.5 * (pixels.rows - 1));
+    cv::Mat turn = cv::getRotationMatrix2D(middle, degrees, 1);
+    const int side = static_cast<int>(std::ceil(std::hypot(pixels.cols, pixels.rows))) + 20;
+    turn.at<double>(0, 2) += 0.5 * (side - pixels.cols);
+    turn.at<double>(1, 2) += 0.5 * (side - pixels.rows);
+    cv::Mat turned;
+    cv::warpAffine(pixels, turned, turn, {side, side}, cv::INTER_CUBIC, cv::BORDER_CONSTANT, ground);
+    return turned;
+}
+
+}  // namespace
+
+// A block that lies askew on a black or a white ground gives the rings of the block alone, and the ground is void.
+TEST(VerificationSegment, BlocksOnBlackAndOnWhite) {
+    // Straight rings, so that their mean width does not hang on which stretch of them is seen.
+    const cv::Mat pixels = picture_of(grow_end_grain({.size = {12e-3, 6e-3}, .pith = {-2.0, 3e-3}, .waviness = 0.0}));
+    const Specimen alone = segment_pixels(pixels).specimen;
+    ASSERT_GE(alone.rings.size(), 3u);
+    for (const auto& [degrees, gray] : {std::pair{0.0, 0}, {15.0, 0}, {15.0, 255}, {-15.0, 250}}) {
+        const cv::Mat shown = turned_on(pixels, degrees, cv::Scalar::all(gray));
+        const Specimen specimen = segment_pixels(shown).specimen;
+        ASSERT_EQ(specimen.rings.size(), alone.rings.size()) << degrees << " deg on " << gray;
+        double worst = 0;
+        for (std::size_t i = 0; i < alone.rings.size(); ++i)
+            worst = std::max(worst, std::abs(specimen.rings[i].width / alone.rings[i].width - 1));
+        const auto voids = std::count(specimen.label.begin(), specimen.label.end(), Specimen::void_label);
+        const double ground = static_cast<double>(shown.total() - pixels.total());
+        std::printf("%g degrees on gray %d: widths within %.2f %% of the block's alone, void %.2f %% of the ground\n", degrees, gray, 100 * worst,
+                    100 * static_cast<double>(voids) / ground);
+        EXPECT_LT(worst, 0.01);
+        EXPECT_NEAR(static_cast<double>(voids) / ground, 1, 0.05);  // its rim is taken with it
+    }
+}
+
+TEST(UnitSegment, ClassesByGivenGrays) {
+    cv::Mat pixels(60, 90, CV_8U, cv::Scalar(200));
+    pixels.colRange(30, 60) = 90;
+    pixels.colRange(60, 90) = 20;
+    cv::Mat grain(pixels.size(), CV_8U);
+    cv::RNG(3).fill(grain, cv::RNG::UNIFORM, 0, 9);
+    pixels += grain;
+    SegmentOptions options;
+    options.gray = {{"dark", 80, 120}, {"bright", 150, 255}};
+    const Specimen specimen = segment_pixels(pixels, options).specimen;
+    EXPECT_EQ(specimen.classes, (std::vector<std::string>{"bright", "dark"}));
+    const auto label = [&](int x) { return specimen.label[static_cast<std::size_t>(30 * 90 + x)]; };
+    EXPECT_EQ(label(10), 0);
+    EXPECT_EQ(label(45), 1);
+    EXPECT_EQ(label(75), Specimen::void_label);
+    options.gray = {{"dark", 80, 160}, {"bright", 150, 255}};
+    EXPECT_THROW(segment_pixels(pixels, options), InputError);
+    options.gray = {{"dark", 80, 256}};
+    EXPECT_THROW(segment_pixels(pixels, options), InputError);
+}
+
+TEST(UnitSegment, DirectionFromASecondPicture) {
+    const cv::Mat pixels = picture_of(grow_end_grain({}));
+    cv::Mat stripes(pixels.size(), CV_8U);
+    for (int y = 0; y < stripes.rows; ++y)
+        for (int x = 0; x < stripes.cols; ++x)
+            stripes.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(128 + 80 * std::sin(0.3 * (x - y)));  // brightest along 45 degrees
+    const TemporaryFolder folder;
+    ASSERT_TRUE(cv::imwrite((folder / "a.png").string(), pixels) && cv::imwrite((folder / "b.png").string(), stripes) &&
+                cv::imwrite((folder / "c.png").string(), stripes.rowRange(0, 100)));
+    const Specimen own = segment(folder / "a.png", {}).specimen;
+    const Specimen other = segment(folder / "a.png", {.direction = folder / "b.png"}).specimen;
+    EXPECT_EQ(other.label, own.label);
+    for (const float angle : other.orientation)
+        ASSERT_NEAR(angle, 0.25 * CV_PI, 0.02);  // x - y grows to the right and up
+    EXPECT_THROW(segment(folder / "a.png", {.direction = folder / "c.png"}), InputError);
+}
+
+// The wood of a specimen with a map of its density lies between EW and LW by that.
+TEST(UnitSegment, DensityByATable) {
+    const EndGrain grown = grow_end_grain({});
+    const TemporaryFolder folder;
+    ASSERT_TRUE(cv::imwrite((folder / "a.png").string(), cv::Mat(grown.rows, grown.columns, CV_8U, const_cast<std::uint8_t*>(grown.gray.data()))));
+    SegmentOptions options;
+    options.pixel = grown.truth.pixel;
+    options.density = DensityTable{{50, 210}, {1000, 200}};  // brighter is lighter, as in a print of an X-ray picture
+    const Segmentation result = segment(folder / "a.png", options);
+    for (std::size_t i = 0; i < grown.gray.size(); i += 97)
+        ASSERT_NEAR(result.specimen.density[i], 1000 - 5.0 * std::clamp<int>(grown.gray[i] - 50, 0, 160), 1e-3);
+
+    Scene scene;
+    scene.file = "scene.toml";
+    scene.specimen.file = folder / "specimen.h5";
+    scene.materials["EW"] = {100e6, 0.3, 400, 100};
+    scene.materials["LW"] = {900e6, 0.3, 800, 100};
+    write(result.specimen, scene.specimen.file);
+    load_specimen(scene);
+    const Specimen& map = *scene.specimen.map;
+    EXPECT_EQ(map.classes, (std::vector<std::string>{"EW", "LW"}));
+    for (std::size_t i = 0; i < map.label.size(); ++i)  // what the exponents of density take: linear in density
+        ASSERT_NEAR(map.label[i] + map.grade[i], std::clamp((result.specimen.density[i] - 400.0) / 400.0, 0.0, 1.0), 1e-5);
+    scene.materials["LW"].density = 400;
+    EXPECT_THROW(load_specimen(scene), InputError);
+}
+
+// Bright dots in LW are canals and no rays; LW fractions do not count them.
+TEST(UnitSegment, ResinCanalsAreKeptApart) {
+    const EndGrain grown = grow_end_grain({.ray_contrast = 0.0});
+    cv::Mat pixels = picture_of(grown);
+    std::vector<cv::Point> canals;
+    for (int y = 40; y < grown.rows - 40; y += 60)
+        for (int x = 20; x < grown.columns - 20; ++x) {
+            bool inside = true;  // of LW
+            for (int d = -8; d <= 8; ++d)
+                inside = inside && grown.degree[static_cast<std::size_t>(y * grown.columns + x + d)] > 0.95f;
+            if (inside) {
+                canals.emplace_back(x, y);
+                cv::circle(pixels, canals.back(), 3, {220, 235, 240}, cv::FILLED);
+                x += 30;
+            }
+        }
+    ASSERT_GT(canals.size(), 8u);
+    const Specimen specimen = segment_pixels(pixels).specimen;
+    std::size_t found = 0;
+    for (const cv::Point& canal : canals)
+        found += specimen.feature[static_cast<std::size_t>(canal.y * grown.columns + canal.x)] == static_cast<int>(Feature::resin_canal);
+    const auto marked = std::count(specimen.feature.begin(), specimen.feature.end(), static_cast<std::uint8_t>(Feature::resin_canal));
+    std::printf("%zu of %zu canals found, %ld pixels marked\n", found, canals.size(), static_cast<long>(marked));
+    EXPECT_GE(found, canals.size() - 1);
+    EXPECT_LT(marked, static_cast<long>(60 * canals.size()));
+}
