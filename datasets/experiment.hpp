@@ -24,12 +24,20 @@ struct Noise {
     std::optional<double> time;          // [s]
 };
 
+/// What stands between the specimen and what the test recorded.
+struct Machine {
+    double compliance = 0;           // displacement recorded for each force, beside the specimen's [m/N]
+    double force_offset = 0;         // recorded where there is no force [N]
+    double displacement_offset = 0;  // recorded where there is no displacement [m]
+};
+
 /// What a test gave, and the scene that models it.
 struct Experiment {
     std::string name;
     Scene scene;
     Curves data;
     Noise noise;
+    Machine machine;
     double weight = 1.0;
     std::filesystem::path data_file;
 };
@@ -43,7 +51,8 @@ struct Prior {
 
 struct Parameter {
     std::string name;
-    std::vector<std::string> keys;  // dotted keys of the scenes, such as materials.EW.toughness
+    std::vector<std::string> keys;  // dotted keys: of the scenes, such as materials.EW.toughness, or of an experiment's machine
+    std::vector<double> factors;    // [keys] times the parameter's value, that of each key; empty: all 1
     double initial = 0;             // SI
     double lower = 0;               // SI
     double upper = 0;               // SI
@@ -51,10 +60,20 @@ struct Parameter {
     double unit_factor = 1;         // SI per `unit`
     Scale scale = Scale::linear;
     std::optional<Prior> prior;
+
+    double factor(std::size_t key) const { return factors.empty() ? 1.0 : factors[key]; }
+};
+
+/// What a residual r, in standard deviations, adds to the misfit.
+enum class Loss {
+    squares,  // r^2
+    huber,    // r^2 up to a bend, then straight (Huber 1964)
+    cauchy,   // c^2 ln(1 + (r/c)^2): far outliers hardly count
 };
 
 struct OptimizerChoice {
     std::string method = "auto";  // auto | ceres | an NLopt name
+    Loss loss = Loss::squares;
     int starts = 1;
     int max_runs = 500;
 };
@@ -93,6 +112,12 @@ struct SensitivityChoice {
     int samples = 0;  // sobol: rows of each of the two sample matrices; morris: trajectories; 0: as many as the method needs
 };
 
+/// One of several models that a study compares: its scenes differ by the value of one key.
+struct ModelChoice {
+    std::string name;           // the value
+    std::vector<Scene> scenes;  // [experiments]
+};
+
 /// What is fitted to what, or, for a sensitivity study, which outputs are asked for.
 struct Study {
     std::string title;
@@ -103,6 +128,8 @@ struct Study {
     OptimizerChoice optimizer;
     UncertaintyChoice uncertainty;
     SensitivityChoice sensitivity;
+    std::string compared_key;         // of the scenes
+    std::vector<ModelChoice> models;  // to be compared; empty where the scenes are taken as they are
     std::optional<double> time_limit;  // of one run of one scene [s]; absent: none
     std::vector<std::pair<std::string, std::string>> scene_settings;  // --set for the scenes, as they were given
     std::filesystem::path file;

@@ -186,6 +186,29 @@ Table checks_table(const Fit& fit) {
     return table;
 }
 
+Table distances_table(const Fit& fit) {
+    Table table{{"experiment", "kind", "area_measured", "area_modelled", "area_between", "frechet"}};
+    for (const CurveDistance& distance : fit.distances)
+        table.push_back({distance.experiment, distance.kind, text_of(distance.area_measured), text_of(distance.area_modelled),
+                         text_of(distance.area_between), text_of(distance.frechet)});
+    return table;
+}
+
+Table models_table(const Fit& fit) {
+    Table table{{"model", "status", "misfit", "AIC", "BIC", "weight"}};
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    for (const ComparedModel& model : fit.models) {
+        Row& row = table.emplace_back();
+        row.insert(row.end(), {model.name, model.status});
+        for (const double number : {model.misfit, model.aic, model.bic, model.weight})
+            row.push_back(text_of(number));
+        for (const double value : model.values)
+            row.push_back(text_of(value));
+    }
+    return table;
+}
+
 Table profile_table(const Fit& fit) {
     Table table{{"parameter", "value", "misfit"}};
     for (const ProfilePoint& point : fit.profile)
@@ -213,6 +236,8 @@ std::vector<Offer> offers(const Fit& fit) {
             {"residuals", [&] { return residuals_table(fit); }},
             {"correlation", [&] { return correlation_table(fit); }},
             {"checks", [&] { return checks_table(fit); }},
+            {"distances", [&] { return distances_table(fit); }},
+            {"models", [&] { return models_table(fit); }},
             {"profile", [&] { return profile_table(fit); }},
             {"posterior", [&] { return posterior_table(fit); }}};
 }

@@ -1,6 +1,7 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/explore.hpp"
 #include "inverse/kept_walks.hpp"
@@ -10,6 +11,7 @@
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
 #include "inverse/walk_descent.hpp"
+#include "inverse/walk_slopes.hpp"
 
 #include <fmt/format.h>
 
@@ -25,11 +27,6 @@ namespace {
 
 constexpr double bound_tolerance = 1e-4;  // of the box
 constexpr int most_cheap_runs = 1000000;  // of those that take milliseconds
-
-// Displacements at which a crack moves differ by this much from grid to grid: in explicit dynamics for vibration and for arrests
-// between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
-// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more).
-constexpr double solver_resolution = 0.02;
 
 using Clock = std::chrono::steady_clock;
 
@@ -169,11 +166,15 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
+    // Steps on walks go on from the one before, where the walks are.
+    Sharing shared([&](const Eigen::VectorXd& values, int threads) { return model.at(values, threads); }, thread_count(options.threads),
+                   by_walks ? nullptr : options.farm);
     Objective objective(
         box.size(), [&](const Eigen::VectorXd& x, int threads) {
-            return store.at(box.values(x), [&] { return model.evaluate(x, threads); });
+            const Eigen::VectorXd values = box.values(x);
+            return store.at(values, [&] { return shared(values, threads); });
         },
-        study.optimizer.max_runs, thread_count(options.threads), options.stop_requested,
+        study.optimizer.max_runs, shared.places(), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
@@ -253,11 +254,28 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
+        fit.distances = curve_distances(fit.residuals);
         fit.message += lack_of_fit(fit.checks) + model.remarks();
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);
     return fit;
+}
+
+StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
+    const auto kept = std::make_shared<const Study>(study);
+    const auto model = std::make_shared<StudyModel>(*kept, KeptWalks(*kept).exact(), solver_resolution, stop);
+    return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
+}
+
+std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    const KeptWalks walks(study);
+    if (!walks.has_exact_slopes()) {
+        return std::nullopt;
+    }
+    const StudyModel near(study, walks.near({values.begin(), values.end()}), solver_resolution, stop);
+    const auto slopes = walk_slopes([&](const Eigen::VectorXd& v) { return near.at(v, 1); }, values, study.parameters);
+    return slopes ? std::optional(slopes->mean()) : std::nullopt;
 }
 
 }  // namespace crampfit

@@ -28,6 +28,10 @@ class KeptWalks {
     /// Whether walks have derivatives by all other parameters.
     bool has_slopes() const;
 
+    /// Whether those, and small differences of toughness, are derivatives of all that a run gives: not where the parameters turn the
+    /// crack's way.
+    bool has_exact_slopes() const;
+
   private:
     class Store;
     std::shared_ptr<Store> store_;

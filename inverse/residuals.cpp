@@ -208,7 +208,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     }
 }
 
-Eigen::VectorXd Comparison::modelled(const Record& record) const {
+Eigen::VectorXd Comparison::modelled(const Record& record, double slack_force) const {
     std::vector<double> abscissa, forces, lengths;
     for (const Instant& instant : record.series) {
         abscissa.push_back(by_time_ ? instant.time : instant.displacement);
@@ -217,7 +217,7 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
     }
     Curve force(abscissa, forces);
     if (record.status == RunStatus::split) {
-        force.continue_with(0.0);
+        force.continue_with(slack_force);
     }
     // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
     const double end = *std::max_element(abscissa.begin(), abscissa.end());
