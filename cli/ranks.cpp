@@ -1,6 +1,8 @@
 #include "cli/ranks.hpp"
 
 #include <fmt/format.h>
+
+#define OMPI_SKIP_MPICXX 1  // the C interface is all that is used
 #include <mpi.h>
 
 #include <algorithm>

@@ -146,14 +146,14 @@ void write_dakota_results(const DakotaRequest& request, const std::vector<double
     std::string text;
     for (std::size_t k = 0; k < request.active.size(); ++k) {
         if (request.active[k] & DakotaRequest::value) {
-            text += fmt::format("{:.17g} {}\n", values[k], request.labels[k].empty() ? fmt::format("f{}", k + 1) : request.labels[k]);
+            text += fmt::format("{} {}\n", values[k], request.labels[k].empty() ? fmt::format("f{}", k + 1) : request.labels[k]);
         }
     }
     for (std::size_t k = 0; k < request.active.size(); ++k) {
         if (request.active[k] & DakotaRequest::gradient) {
             text += "[";
             for (const double slope : gradients[k]) {
-                text += fmt::format(" {:.17g}", slope);
+                text += fmt::format(" {}", slope);
             }
             text += " ]\n";
         }

@@ -24,6 +24,10 @@ class KeptWalk {
     /// False where toughness changes more than when the crack moves: in explicit dynamics, or with several growing tips.
     bool reusable() const { return reusable_; }
 
+    /// Whether states are found by themselves. Else each is found from those found before, and depends on them by what Newton's
+    /// method leaves: so does what a run gives.
+    bool linear() const { return plan_.linear; }
+
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. One run at a
     /// time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options);

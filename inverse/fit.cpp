@@ -154,27 +154,32 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
+    const int threads = thread_count(options.threads);
     const KeptWalks walks(study);
-    const StudyModel model(study, own ? walks.exact() : options.forward, own ? solver_resolution : 0.0, options.stop_requested);
     const bool only_toughness = own && walks.only_toughness();
     const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
+    // The same bits for any number of threads: runs that go on from one another are made one after the other.
+    const bool on_walks = by_walks || only_toughness;
+    const bool in_order = on_walks && walks.depend_on_order();
+    const Forward forward = !own ? options.forward : on_walks ? walks.exact() : walks.in_any_order();
+    const StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
     const Near near = [&](const Eigen::VectorXd& point) -> Objective::Evaluate {
         const Eigen::VectorXd values = model.box().values(point);
         auto close = std::make_shared<StudyModel>(study, walks.near({values.begin(), values.end()}), solver_resolution, options.stop_requested);
-        return [close](const Eigen::VectorXd& x, int threads) { return close->evaluate(x, threads); };
+        return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
     };
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
     // Steps on walks go on from the one before, where the walks are.
-    Sharing shared([&](const Eigen::VectorXd& values, int threads) { return model.at(values, threads); }, thread_count(options.threads),
-                   by_walks ? nullptr : options.farm);
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
+                   by_walks || in_order ? nullptr : options.farm);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int threads) {
+        box.size(), [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = box.values(x);
-            return store.at(values, [&] { return shared(values, threads); });
+            return store.at(values, [&] { return shared(values, share); });
         },
-        study.optimizer.max_runs, shared.places(), options.stop_requested,
+        study.optimizer.max_runs, in_order ? 1 : shared.places(), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
@@ -264,7 +269,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
 
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
     const auto kept = std::make_shared<const Study>(study);
-    const auto model = std::make_shared<StudyModel>(*kept, KeptWalks(*kept).exact(), solver_resolution, stop);
+    const auto model = std::make_shared<StudyModel>(*kept, KeptWalks(*kept).in_any_order(), solver_resolution, stop);
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 

@@ -75,6 +75,13 @@ class KeptWalks::Store {
         return of_wood && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
     }
 
+    bool depend_on_order() const {
+        return std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) {
+            const KeptWalk walk(*scene);
+            return walk.reusable() && !walk.linear();
+        });
+    }
+
     bool has_exact_slopes() const {
         if (others_.empty() ? !only_toughness() : !has_slopes()) {
             return false;
@@ -149,6 +156,19 @@ KeptWalks::~KeptWalks() = default;
 Forward KeptWalks::exact() const {
     return [store = store_](const Scene& scene, const std::atomic<bool>* stop) { return store->run(scene, stop); };
 }
+
+Forward KeptWalks::in_any_order() const {
+    if (!depend_on_order()) {
+        return exact();
+    }
+    return [](const Scene& scene, const std::atomic<bool>* stop) {
+        SimulateOptions options;
+        options.stop_requested = stop;
+        return simulate(scene, options);
+    };
+}
+
+bool KeptWalks::depend_on_order() const { return store_->depend_on_order(); }
 
 Forward KeptWalks::near(const std::vector<double>& values) const {
     return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, stop); };

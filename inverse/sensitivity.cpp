@@ -231,7 +231,11 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     check_sensitivity_study(study);
     const KeptWalks walks(study);
     const bool own = !options.forward;
-    const OutputModel model(study, own ? walks.exact() : options.forward, options.stop_requested);
+    // The same bits for any number of threads: runs that go on from one another are made one after the other.
+    const bool in_order = own && walks.only_toughness() && walks.depend_on_order();
+    const Forward forward = !own ? options.forward : in_order ? walks.exact() : walks.in_any_order();
+    const OutputModel model(study, forward, options.stop_requested);
+    const int threads = thread_count(options.threads);
     Slopes slopes;
     if (own && walks.has_exact_slopes()) {
         slopes = [&] { return slopes_at(study, walks, model.box().values(model.box().initial()), options.stop_requested); };
@@ -244,16 +248,16 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
 
     SensitivityProgress progress;
     progress.planned = runs_of(study, slopes != nullptr);
-    Sharing shared([&](const Eigen::VectorXd& values, int threads) { return model.at(values, threads); }, thread_count(options.threads),
-                   options.farm);
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
+                   in_order ? nullptr : options.farm);
     RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
         model.box().size(),
-        [&](const Eigen::VectorXd& x, int threads) {
+        [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = model.box().values(x);
-            return store.at(values, [&] { return shared(values, threads); });
+            return store.at(values, [&] { return shared(values, share); });
         },
-        progress.planned, shared.places(), options.stop_requested, [&](const Run& run) {
+        progress.planned, in_order ? 1 : shared.places(), options.stop_requested, [&](const Run& run) {
             ++progress.runs;
             progress.failed += run.evaluation->usable() ? 0 : 1;
             progress.failure = failure_text(study, model.box().values(run.x), *run.evaluation);
@@ -273,7 +277,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
 
 StudyFunction output_function(const Study& study, const std::atomic<bool>* stop) {
     const auto kept = std::make_shared<const Study>(study);
-    const auto model = std::make_shared<OutputModel>(*kept, KeptWalks(*kept).exact(), stop);
+    const auto model = std::make_shared<OutputModel>(*kept, KeptWalks(*kept).in_any_order(), stop);
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 

@@ -57,8 +57,9 @@ max_runs = 24
 )";
 
 Outcome on_ranks(Command& command, int ranks, int threads, const std::string& verb, const std::string& output) {
-    const std::string words = fmt::format("cd {} && mpirun --allow-run-as-root --oversubscribe --bind-to none -n {} {} {} study.toml -o {} --threads {} > out.txt 2> error.txt",
-                                          command.folder / ".", ranks, COMMAND, verb, output, threads);
+    const std::string words = fmt::format("cd {} && mpirun --allow-run-as-root --oversubscribe --bind-to none -n {} {} {} study.toml -o {} "
+                                          "--threads {} > out.txt 2> error.txt",
+                                          command.path("."), ranks, COMMAND, verb, output, threads);
     const int status = std::system(words.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 255, command.folder.read("out.txt"), command.folder.read("error.txt")};
 }

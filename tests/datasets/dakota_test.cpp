@@ -67,8 +67,8 @@ TEST(UnitDakota, ReadsBothFormats) {
 TEST(UnitDakota, WritesValuesThenGradientsThatWereAskedFor) {
     const TemporaryFolder folder;
     const DakotaRequest request = read_dakota_request(folder.write("params.in", standard));
-    write_dakota_results(request, {1.0 / 3.0, 7.0}, {{0.5, -2}, {1e-300, 4}}, folder / "results.out");
-    EXPECT_EQ(folder.read("results.out"), "0.33333333333333331 response_fn_1\n[ 0.5 -2 ]\n[ 1.0000000000000000e-300 4 ]\n");
+    write_dakota_results(request, {1.0 / 3.0, 7.0}, {{0.5, -2.0}, {1e-300, 4}}, folder / "results.out");
+    EXPECT_EQ(folder.read("results.out"), "0.3333333333333333 response_fn_1\n[ 0.5 -2 ]\n[ 1e-300 4 ]\n");
     write_dakota_failure("first\nsecond", folder / "results.out");
     EXPECT_EQ(folder.read("results.out"), "fail: first second\n");
 }

@@ -41,7 +41,7 @@ Study compared_study(std::size_t truth, double spread, unsigned seed) {
 }
 
 TEST(VerificationCompare, RanksTheHiddenCriterionFirst) {
-    constexpr double spread = 0.03;  // 60 um of a ring of 2 mm, with 100 um of noise
+    constexpr double spread = 0.004;  // 8 um of a ring of 2 mm, with 100 um of noise in each row
     int first = 0;
     for (unsigned trial = 0; trial < 10; ++trial) {
         const std::size_t truth = trial % 4;
@@ -105,9 +105,9 @@ TEST(VerificationLoss, OutliersHardlyMoveARobustFit) {
         std::printf("loss %d: earlywood off by %.3f %%, standard error %.3f %%\n", static_cast<int>(loss), 100 * off[static_cast<int>(loss)],
                     100 * fit.parameters[0].standard_error / true_earlywood);
     }
-    EXPECT_GT(off[0], 5 * off[1]);
-    EXPECT_GT(off[1], off[2]);
-    EXPECT_LT(off[2], 0.005);
+    EXPECT_GT(off[0], 0.1);
+    EXPECT_LT(off[1], 0.01);
+    EXPECT_LT(off[2], 0.01);
 }
 
 TEST(UnitCurveDistance, ClosedForms) {
