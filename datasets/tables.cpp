@@ -1,3 +1,5 @@
+#include "datasets/tables.hpp"
+
 #include "datasets/crack_track.hpp"
 #include "datasets/displacement_field.hpp"
 #include "datasets/error.hpp"
@@ -377,6 +379,13 @@ std::vector<Offer> offers(const CrackTrack& track) {
             {"experiment", [&] { return curves_table(curves_of(track)); }}};
 }
 
+template <class Result> std::vector<std::string> names_of(const Result& result) {
+    std::vector<std::string> names;
+    for (const Offer& offer : offers(result))
+        names.push_back(offer.name);
+    return names;
+}
+
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
                   std::ostream& out) {
     std::vector<std::string> names;
@@ -391,6 +400,16 @@ void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path&
 }
 
 }  // namespace
+
+std::vector<std::string> table_names(const Record& record) { return names_of(record); }
+std::vector<std::string> table_names(const Fit& fit) { return names_of(fit); }
+std::vector<std::string> table_names(const Sensitivity& sensitivity) { return names_of(sensitivity); }
+
+void print_table(const Record& record, const std::string& table, std::ostream& out) { print_one_of(offers(record), "the record", table, out); }
+void print_table(const Fit& fit, const std::string& table, std::ostream& out) { print_one_of(offers(fit), "the fit", table, out); }
+void print_table(const Sensitivity& sensitivity, const std::string& table, std::ostream& out) {
+    print_one_of(offers(sensitivity), "the sensitivity study", table, out);
+}
 
 void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out) {
     const std::string kind = hdf5::open(file).attribute("kind");
