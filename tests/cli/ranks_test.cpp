@@ -124,6 +124,29 @@ TEST(SystemRanks, FailedRunsAreRecorded) {
     EXPECT_TRUE(contains(outcome.error, "to run it again")) << outcome.error;
 }
 
+// A rank that dies takes the others with it; what has ended is kept, and one process goes on from there to the same bits.
+TEST(SystemRanks, ALostRankCostsNoRunThatHasEnded) {
+    Command command;
+    std::string scene = small_scene;
+    scene.replace(scene.find("\"0.5 mm\""), 8, "\"0.2 mm\"");
+    command.folder.write("scene.toml", scene);
+    command.folder.write("study.toml", sensitivity_study);
+    const std::string script = fmt::format(
+        "mpirun --allow-run-as-root --oversubscribe --bind-to none -n 3 {} sensitivity {} -o {} --threads 1 > {} 2>&1 & job=$!\n"
+        "for i in $(seq 6000); do [ \"$(stat -c %s {}.runs 2> /dev/null || echo 0)\" -gt 500 ] && break; sleep 0.01; done\n"
+        "for p in $(pgrep -f '{}'); do grep -qz OMPI_COMM_WORLD_RANK=2 /proc/$p/environ && kill -9 $p; done\nwait $job\n",
+        COMMAND, command.path("study.toml"), command.path("lost.h5"), command.path("out.txt"), command.path("lost.h5"),
+        "sensitivity " + command.path("study.toml"));
+    EXPECT_NE(std::system(script.c_str()), 0);
+    EXPECT_FALSE(std::filesystem::exists(command.path("lost.h5")));
+    const auto kept = command.folder.read("lost.h5.runs").size();
+    EXPECT_GT(kept, 500u);
+    ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("lost.h5"), "--resume", "--quiet"}).status, 0);
+    ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("alone.h5"), "--quiet"}).status, 0);
+    EXPECT_EQ(command.run({"csv", command.path("lost.h5"), "indices"}).out, command.run({"csv", command.path("alone.h5"), "indices"}).out);
+    EXPECT_EQ(command.folder.read("lost.h5.runs").size(), command.folder.read("alone.h5.runs").size());  // none was run twice
+}
+
 TEST(SystemRanks, BadInputIsSaidOnce) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
