@@ -52,6 +52,9 @@ std::vector<CurveDistance> curve_distances(const std::vector<FitResidual>& resid
             ++end;
         }
         const Stations curve(residuals.data() + begin, end - begin);
+        if (curve[0].kind != "force" && curve[0].kind != "arrival") {
+            continue;  // no curve
+        }
         CurveDistance& distance = distances.emplace_back();
         distance.experiment = curve[0].experiment;
         distance.kind = curve[0].kind;
