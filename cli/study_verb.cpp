@@ -4,6 +4,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 namespace crampfit::cli {
 
 void add_study_arguments(CLI::App& verb, StudyArguments& arguments, const char* result) {
