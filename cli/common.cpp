@@ -1,5 +1,6 @@
 #include "cli/common.hpp"
 
+#include "cli/ranks.hpp"
 #include "datasets/error.hpp"
 #include "datasets/whole_file.hpp"
 
@@ -10,7 +11,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <thread>
 
 namespace crampfit::cli {
 
@@ -21,7 +21,7 @@ constexpr int most_threads = 4096;  // more is a slip of the finger
 }  // namespace
 
 void add_common_options(CLI::App& command, CommonOptions& common) {
-    common.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, most_threads);
+    common.threads = std::min(cores_of_rank(), most_threads);
     command
         .add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
         ->type_name("KEY=VALUE")

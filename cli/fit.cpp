@@ -1,25 +1,16 @@
-#include "inverse/fit.hpp"
-
-#include "cli/progress.hpp"
-#include "cli/stop.hpp"
+#include "cli/study_verb.hpp"
 #include "cli/verbs.hpp"
-#include "imaging/picture.hpp"
+#include "inverse/compare.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 namespace crampfit::cli {
 
 namespace {
-
-struct Arguments {
-    std::filesystem::path study;
-    std::filesystem::path output;
-    bool resume = false;
-};
 
 ExitStatus exit_status(FitStatus status) {
     switch (status) {
@@ -34,22 +25,25 @@ ExitStatus exit_status(FitStatus status) {
     throw std::logic_error("a fit status without an exit status");
 }
 
-Fit run(const Study& study, const Arguments& arguments, const CommonOptions& common) {
-    ProgressLine line(common, "runs");
-    FitOptions options;
-    options.threads = common.threads;
-    options.stop_requested = &stop_requested();
-    options.keeping = {arguments.output.string() + ".runs", arguments.resume};
+Fit run(const Study& study, const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
+    RunsLine line(common);
+    auto options = study_options<FitOptions>(arguments, common, ranks);
     options.progress = [&](const FitProgress& progress) {
-        if (!progress.failure.empty())
-            report(common, progress.failure);
-        const double fraction = std::min(1.0, static_cast<double>(progress.runs) / std::max(1, progress.max_runs));
-        line.show(fraction, progress.runs,
-                  fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs,
-                              progress.runs <= progress.max_runs ? fmt::format(" of {} at most", progress.max_runs) : "",
-                              progress.best_misfit));
+        const std::string most = progress.runs <= progress.max_runs ? fmt::format(" of {} at most", progress.max_runs) : "";
+        line.show(progress.runs, progress.max_runs, progress.failure,
+                  fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs, most, progress.best_misfit));
     };
-    return fit_study(study, options);
+    return fit_models(study, options);
+}
+
+/// What the other ranks do for the one that leads.
+void serve(const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
+    std::optional<Study> study;
+    ranks.serve([&](int model) {
+        if (!study)
+            study = open_study(arguments.study, common);
+        return fit_function(study->models.empty() ? *study : model_of(*study, static_cast<std::size_t>(model)), &stop_requested());
+    });
 }
 
 /// The result for a person; `crampfit csv FIT.h5 parameters` prints all digits.
@@ -64,17 +58,21 @@ std::string table_text(const Fit& fit) {
                             parameter.standard_error,
                             fmt::format("{:.4g} .. {:.4g}", parameter.lower_95, parameter.upper_95), parameter.unit,
                             parameter.at_bound ? "  (at a bound)" : "");
+    for (const ComparedModel& model : fit.models)
+        text += fmt::format("{:<24}  misfit {:>9.4g}  AIC {:>9.4g}  BIC {:>9.4g}  weight {:.3g}\n", model.name, model.misfit, model.aic,
+                            model.bic, model.weight);
     return text;
 }
 
-ExitStatus fit_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& common) {
+    Ranks ranks(common.threads);
+    if (!ranks.leads()) {
+        serve(arguments, common, ranks);
+        return ExitStatus::done;
+    }
     check_output(arguments.output, arguments.study);
-    Study study = read_study(arguments.study, overrides_of(common));
-    for (Experiment& experiment : study.experiments)
-        load_specimen(experiment.scene);
-    stop_on_signals();
-    spdlog::info("the study is read");
-    const Fit fit = run(study, arguments, common);
+    const Study study = open_study(arguments.study, common);
+    const Fit fit = run(study, arguments, common, ranks);
     write(fit, arguments.output);
     report(common, fmt::format("{}: {}; {} runs in {}, saved as {}", name(fit.status), fit.message, fit.runs.size(),
                                duration_text(fit.seconds), arguments.output.string()));
@@ -85,11 +83,9 @@ ExitStatus fit_and_save(const Arguments& arguments, const CommonOptions& common)
 }  // namespace
 
 Verb fit_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<StudyArguments>();
     CLI::App* verb = command.add_subcommand("fit", "Adjust parameters until the simulations match the experiments");
-    verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();
-    verb->add_option("-o,--output", arguments->output, "Where the fit goes")->type_name("FIT.h5")->required();
-    verb->add_flag("--resume", arguments->resume, "Go on from the runs that an earlier call has kept beside its output");
+    add_study_arguments(*verb, *arguments, "FIT.h5");
     return {verb, [arguments, &common] { return fit_and_save(*arguments, common); }};
 }
 

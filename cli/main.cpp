@@ -70,9 +70,10 @@ ExitStatus run_command(int argc, const char* const* argv) {
     add_common_options(command, common);
     const std::vector<Verb> verbs{simulate_verb(command, common), explain_verb(command, common),
                                   fit_verb(command, common), sensitivity_verb(command, common),
-                                  segment_verb(command, common), correlate_verb(command, common),
-                                  track_verb(command, common), camera_verb(command, common), csv_verb(command, common),
-                                  report_verb(command, common), bench_verb(command, common)};
+                                  evaluate_verb(command, common), segment_verb(command, common),
+                                  correlate_verb(command, common), track_verb(command, common), camera_verb(command, common),
+                                  csv_verb(command, common), report_verb(command, common),
+                                  bench_verb(command, common)};
     for (const Verb& verb : verbs)
         verb.arguments->footer(
             "Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");

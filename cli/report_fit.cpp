@@ -132,6 +132,32 @@ std::string checks_section(const Fit& fit) {
                          {"Experiment", "Curve", "Points", "Chi-square", "p of it", "Autocorrelation", "p of it"}, rows));
 }
 
+std::string distances_section(const Fit& fit) {
+    if (fit.distances.empty())
+        return {};
+    std::vector<std::vector<std::string>> rows;
+    for (const CurveDistance& distance : fit.distances)
+        rows.push_back({distance.experiment, distance.kind, fmt::format("{:.4g}", distance.area_measured),
+                        fmt::format("{:.4g}", distance.area_modelled), fmt::format("{:.3g}", distance.area_between),
+                        fmt::format("{:.3g}", distance.frechet)});
+    return section("How far the curves are apart",
+                   table("Areas in SI: under force over displacement it is the work in J. Frechet distance with both axes divided by the "
+                         "measured range. The fit does not rest on these.",
+                         {"Experiment", "Curve", "Area, measured", "Area, modelled", "Area between", "Frechet distance"}, rows));
+}
+
+std::string models_section(const Fit& fit) {
+    if (fit.models.empty())
+        return {};
+    std::vector<std::vector<std::string>> rows;
+    for (const ComparedModel& model : fit.models)
+        rows.push_back({model.name, model.status, fmt::format("{:.4g}", model.misfit), fmt::format("{:.4g}", model.aic),
+                        fmt::format("{:.4g}", model.bic), fmt::format("{:.3g}", model.weight)});
+    return section("Which model the data speak for",
+                   table("The best one first; all else on this page is of that one. Akaike weights share out the evidence.",
+                         {"Model", "Ended", "Misfit", "AIC", "BIC", "Weight"}, rows));
+}
+
 // ---- parameters
 
 std::string parameters_section(const Fit& fit) {
@@ -307,8 +333,8 @@ std::string summary(const Fit& fit) {
 
 std::string fit_page(const Fit& fit, const Origin& origin) {
     const std::string title = title_of(fit.study_text, origin);
-    return page(title, heading(title, "Fit", origin) + summary(fit) + parameters_section(fit) + comparisons_section(fit) +
-                           checks_section(fit) + correlation_section(fit) + profiles_section(fit) + posterior_section(fit) +
+    return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) +
+                           comparisons_section(fit) + checks_section(fit) + distances_section(fit) + correlation_section(fit) + profiles_section(fit) + posterior_section(fit) +
                            runs_section(fit) + repeat_section(fit.study_text, "fit", "study.toml", origin));
 }
 

@@ -1,12 +1,9 @@
 #include "inverse/sensitivity.hpp"
 
-#include "cli/progress.hpp"
-#include "cli/stop.hpp"
+#include "cli/study_verb.hpp"
 #include "cli/verbs.hpp"
-#include "imaging/picture.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <memory>
@@ -14,12 +11,6 @@
 namespace crampfit::cli {
 
 namespace {
-
-struct Arguments {
-    std::filesystem::path study;
-    std::filesystem::path output;
-    bool resume = false;
-};
 
 ExitStatus exit_status(SensitivityStatus status) {
     switch (status) {
@@ -33,17 +24,11 @@ ExitStatus exit_status(SensitivityStatus status) {
     throw std::logic_error("a sensitivity status without an exit status");
 }
 
-Sensitivity run(const Study& study, const Arguments& arguments, const CommonOptions& common) {
-    ProgressLine line(common, "runs");
-    SensitivityOptions options;
-    options.threads = common.threads;
-    options.stop_requested = &stop_requested();
-    options.keeping = {arguments.output.string() + ".runs", arguments.resume};
+Sensitivity run(const Study& study, const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
+    RunsLine line(common);
+    auto options = study_options<SensitivityOptions>(arguments, common, ranks);
     options.progress = [&](const SensitivityProgress& progress) {
-        if (!progress.failure.empty())
-            report(common, progress.failure);
-        const double fraction = static_cast<double>(progress.runs) / std::max(1, progress.planned);
-        line.show(std::min(1.0, fraction), progress.runs,
+        line.show(progress.runs, progress.planned, progress.failure,
                   fmt::format("{} runs of {}, {} failed", progress.runs, progress.planned, progress.failed));
     };
     return study_sensitivity(study, options);
@@ -64,16 +49,15 @@ std::string table_text(const Sensitivity& sensitivity) {
     return text;
 }
 
-ExitStatus study_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus study_and_save(const StudyArguments& arguments, const CommonOptions& common) {
+    Ranks ranks(common.threads);
+    if (!ranks.leads()) {
+        ranks.serve([&](int) { return output_function(open_study(arguments.study, common), &stop_requested()); });
+        return ExitStatus::done;
+    }
     check_output(arguments.output, arguments.study);
-    Study study = read_study(arguments.study, overrides_of(common));
-    if (study.scene)
-        load_specimen(*study.scene);
-    for (Experiment& experiment : study.experiments)
-        load_specimen(experiment.scene);
-    stop_on_signals();
-    spdlog::info("the study is read");
-    const Sensitivity sensitivity = run(study, arguments, common);
+    const Study study = open_study(arguments.study, common);
+    const Sensitivity sensitivity = run(study, arguments, common, ranks);
     write(sensitivity, arguments.output);
     report(common, fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,
                                duration_text(sensitivity.seconds), arguments.output.string()));
@@ -84,11 +68,9 @@ ExitStatus study_and_save(const Arguments& arguments, const CommonOptions& commo
 }  // namespace
 
 Verb sensitivity_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<StudyArguments>();
     CLI::App* verb = command.add_subcommand("sensitivity", "Local, Morris and Sobol sensitivity of the chosen outputs");
-    verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();
-    verb->add_option("-o,--output", arguments->output, "Where the result goes")->type_name("OUT.h5")->required();
-    verb->add_flag("--resume", arguments->resume, "Go on from the runs that an earlier call has kept beside its output");
+    add_study_arguments(*verb, *arguments, "OUT.h5");
     return {verb, [arguments, &common] { return study_and_save(*arguments, common); }};
 }
 

@@ -17,6 +17,7 @@ struct Verb {
 Verb simulate_verb(CLI::App& command, const CommonOptions& common);
 Verb explain_verb(CLI::App& command, const CommonOptions& common);
 Verb fit_verb(CLI::App& command, const CommonOptions& common);
+Verb evaluate_verb(CLI::App& command, const CommonOptions& common);
 Verb segment_verb(CLI::App& command, const CommonOptions& common);
 Verb correlate_verb(CLI::App& command, const CommonOptions& common);
 Verb track_verb(CLI::App& command, const CommonOptions& common);

@@ -40,6 +40,13 @@ struct MeasuredFields {
     bool camera_moves = true;                // against the specimen, a little, as a whole: says nothing then
 };
 
+/// What stands between the specimen and what the test recorded.
+struct Machine {
+    double compliance = 0;           // displacement recorded for each force, beside the specimen's [m/N]
+    double force_offset = 0;         // recorded where there is no force [N]
+    double displacement_offset = 0;  // recorded where there is no displacement [m]
+};
+
 /// What a test gave, and the scene that models it.
 struct Experiment {
     std::string name;
@@ -47,6 +54,7 @@ struct Experiment {
     Curves data;                           // none of its columns, where fields are all there is
     std::optional<MeasuredFields> fields = {};
     Noise noise;
+    Machine machine;
     double weight = 1.0;
     std::filesystem::path data_file;
 };
@@ -60,7 +68,8 @@ struct Prior {
 
 struct Parameter {
     std::string name;
-    std::vector<std::string> keys;  // dotted keys of the scenes, such as materials.EW.toughness
+    std::vector<std::string> keys;  // dotted keys: of the scenes, such as materials.EW.toughness, or of an experiment's machine
+    std::vector<double> factors;    // [keys] times the parameter's value, that of each key; empty: all 1
     double initial = 0;             // SI
     double lower = 0;               // SI
     double upper = 0;               // SI
@@ -68,10 +77,20 @@ struct Parameter {
     double unit_factor = 1;         // SI per `unit`
     Scale scale = Scale::linear;
     std::optional<Prior> prior;
+
+    double factor(std::size_t key) const { return factors.empty() ? 1.0 : factors[key]; }
+};
+
+/// What a residual r, in standard deviations, adds to the misfit.
+enum class Loss {
+    squares,  // r^2
+    huber,    // r^2 up to a bend, then straight (Huber 1964)
+    cauchy,   // c^2 ln(1 + (r/c)^2): far outliers hardly count
 };
 
 struct OptimizerChoice {
     std::string method = "auto";  // auto | ceres | an NLopt name
+    Loss loss = Loss::squares;
     int starts = 1;
     int max_runs = 500;
 };
@@ -121,6 +140,12 @@ std::vector<double> subset_weights(int order);
 inline constexpr int samples_a_side = 5;
 inline constexpr int samples_a_subset = samples_a_side * samples_a_side;
 
+/// One of several models that a study compares: its scenes differ by the value of one key.
+struct ModelChoice {
+    std::string name;           // the value
+    std::vector<Scene> scenes;  // [experiments]
+};
+
 /// What is fitted to what, or, for a sensitivity study, which outputs are asked for.
 struct Study {
     std::string title;
@@ -131,6 +156,8 @@ struct Study {
     OptimizerChoice optimizer;
     UncertaintyChoice uncertainty;
     SensitivityChoice sensitivity;
+    std::string compared_key;         // of the scenes
+    std::vector<ModelChoice> models;  // to be compared; empty where the scenes are taken as they are
     std::optional<double> time_limit;  // of one run of one scene [s]; absent: none
     std::vector<std::pair<std::string, std::string>> scene_settings;  // --set for the scenes, as they were given
     std::filesystem::path file;

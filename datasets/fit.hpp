@@ -58,6 +58,27 @@ struct FitCheck {
     double p_autocorrelation = 1;  // how often white noise makes it as large
 };
 
+/// How far one modelled curve is from the measured one, at the stations of the residuals. To look at: no fit rests on these.
+struct CurveDistance {
+    std::string experiment;
+    std::string kind;          // "force" or "arrival"
+    double area_measured = 0;  // under the curve, SI: of force over displacement the work [J]
+    double area_modelled = 0;  // the same
+    double area_between = 0;   // the same, of the absolute difference
+    double frechet = 0;        // Frechet distance, both axes divided by the measured range
+};
+
+/// One of the models that a study compares.
+struct ComparedModel {
+    std::string name;
+    std::string status;           // of its fit
+    double misfit = 0;            // sum of squared weighted residuals; infinite when no run ended well
+    std::vector<double> values;   // of the parameters, in their units
+    double aic = 0;               // Akaike's information criterion; infinite when no run ended well
+    double bic = 0;               // Bayesian information criterion
+    double weight = 0;            // Akaike weight: of the evidence, all together 1
+};
+
 /// One point of a parameter's profile: the least misfit with that parameter held.
 struct ProfilePoint {
     std::string parameter;
@@ -83,6 +104,8 @@ struct Fit {
     double reduced_chi_square = 0;
     std::vector<FitResidual> residuals;
     std::vector<FitCheck> checks;        // of each curve
+    std::vector<CurveDistance> distances;  // of each curve
+    std::vector<ComparedModel> models;   // best first; empty where none were compared
     std::vector<ProfilePoint> profile;   // of each parameter, if asked for
     std::vector<PosteriorSample> posterior;
     std::vector<FitRun> runs;

@@ -194,6 +194,78 @@ std::vector<FitCheck> read_checks(const Group& group) {
     return checks;
 }
 
+struct DistanceColumn {
+    const char* name;
+    double CurveDistance::*value;
+    const char* units;
+    const char* description;
+};
+
+const char* const area_units = "J for force over displacement, m^2 for arrival over crack length, N s for force over time";
+
+constexpr DistanceColumn distance_numbers[] = {
+    {"area_measured", &CurveDistance::area_measured, area_units, "under the measured curve"},
+    {"area_modelled", &CurveDistance::area_modelled, area_units, "under the modelled curve"},
+    {"area_between", &CurveDistance::area_between, area_units, "between both"},
+    {"frechet", &CurveDistance::frechet, "1", "Frechet distance of both, axes divided by the measured range"},
+};
+
+void write_distances(Group& root, const std::vector<CurveDistance>& distances) {
+    Group group = root.make_group("distances", "how far the curves are apart; the table `distances`");
+    group.write_texts("experiment", column_of(distances, &CurveDistance::experiment), "name of the experiment");
+    group.write_texts("kind", column_of(distances, &CurveDistance::kind), "force or arrival");
+    for (const DistanceColumn& column : distance_numbers)
+        group.write(column.name, column_of(distances, column.value), {column.units, column.description});
+}
+
+std::vector<CurveDistance> read_distances(const Group& group) {
+    std::vector<CurveDistance> distances(group.read_texts("experiment").size());
+    fill_column(distances, &CurveDistance::experiment, group.read_texts("experiment", distances.size()));
+    fill_column(distances, &CurveDistance::kind, group.read_texts("kind", distances.size()));
+    for (const DistanceColumn& column : distance_numbers)
+        fill_column(distances, column.value, group.read_column<double>(column.name, distances.size()));
+    return distances;
+}
+
+struct ModelColumn {
+    const char* name;
+    double ComparedModel::*value;
+    const char* description;
+};
+
+constexpr ModelColumn model_numbers[] = {
+    {"misfit", &ComparedModel::misfit, "sum of squared weighted residuals; infinite when no run ended well"},
+    {"aic", &ComparedModel::aic, "Akaike's information criterion"},
+    {"bic", &ComparedModel::bic, "Bayesian information criterion"},
+    {"weight", &ComparedModel::weight, "Akaike weight"},
+};
+
+void write_models(Group& root, const std::vector<ComparedModel>& models, std::size_t parameters) {
+    Group group = root.make_group("models", "models that were compared, best first; the table `models`");
+    group.write_texts("name", column_of(models, &ComparedModel::name), "value of the key that tells them apart");
+    group.write_texts("status", column_of(models, &ComparedModel::status), "how its fit ended");
+    for (const ModelColumn& column : model_numbers)
+        group.write(column.name, column_of(models, column.value), {"1", column.description});
+    std::vector<double> values;
+    for (const ComparedModel& model : models)
+        values.insert(values.end(), model.values.begin(), model.values.end());
+    group.write("parameters", values, {models.size(), parameters}, {parameter_units, "a row a model, a column a parameter"});
+}
+
+std::vector<ComparedModel> read_models(const Group& group, std::size_t parameters) {
+    const auto [shape, values] = group.read<double>("parameters", {std::nullopt, parameters});
+    std::vector<ComparedModel> models(shape.front());
+    for (std::size_t i = 0; i < models.size(); ++i) {
+        const double* first = values.data() + i * parameters;
+        models[i].values.assign(first, first + parameters);
+    }
+    fill_column(models, &ComparedModel::name, group.read_texts("name", models.size()));
+    fill_column(models, &ComparedModel::status, group.read_texts("status", models.size()));
+    for (const ModelColumn& column : model_numbers)
+        fill_column(models, column.value, group.read_column<double>(column.name, models.size()));
+    return models;
+}
+
 void write_profile(Group& root, const std::vector<ProfilePoint>& profile) {
     Group group = root.make_group("profile", "least misfit with one parameter held; the table `profile`");
     group.write_texts("parameter", column_of(profile, &ProfilePoint::parameter), "the one that is held");
@@ -264,6 +336,8 @@ void write(const Fit& fit, const std::filesystem::path& file) {
         write_runs(root, fit.runs, fit.parameters.size());
         write_residuals(root, fit.residuals);
         write_checks(root, fit.checks);
+        write_distances(root, fit.distances);
+        write_models(root, fit.models, fit.parameters.size());
         write_profile(root, fit.profile);
         write_posterior(root, fit.posterior, fit.parameters.size());
     });
@@ -286,6 +360,8 @@ Fit read_fit(const std::filesystem::path& file) {
     fit.runs = read_runs(root.group("runs"), fit.parameters.size());
     fit.residuals = read_residuals(root.group("residuals"));
     fit.checks = read_checks(root.group("checks"));
+    fit.distances = read_distances(root.group("distances"));
+    fit.models = read_models(root.group("models"), fit.parameters.size());
     fit.profile = read_profile(root.group("profile"));
     fit.posterior = read_posterior(root.group("posterior"), fit.parameters.size());
     return fit;

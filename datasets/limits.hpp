@@ -55,6 +55,9 @@ inline constexpr NumberRule until = positive(dimension::time);
 inline constexpr NumberRule friction = not_negative(dimension::number);
 inline constexpr NumberRule advance = not_negative(dimension::length);
 inline constexpr NumberRule share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
+inline constexpr NumberRule compliance = not_negative(dimension::compliance);
+inline constexpr NumberRule force_offset = finite(dimension::force);
+inline constexpr NumberRule displacement_offset = finite(dimension::length);
 inline constexpr NumberRule damping = not_negative(dimension::rate);
 }  // namespace limits
 

@@ -1,5 +1,6 @@
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "datasets/machine.hpp"
 #include "datasets/study_parts.hpp"
 #include "datasets/text_file.hpp"
 #include "datasets/toml_reader.hpp"
@@ -12,7 +13,8 @@ namespace crampfit {
 namespace {
 
 const std::vector<std::string> study_keys{"title",     "experiments", "scene",       "outputs",
-                                          "parameters", "optimizer",   "uncertainty", "sensitivity", "runs"};
+                                          "parameters", "optimizer",   "uncertainty", "sensitivity", "runs",
+                                          "compare"};
 
 /// What --set gives, for the study itself and for all its scenes.
 struct SplitOverrides {
@@ -51,8 +53,21 @@ Noise read_noise(const Entry& entry, const Curves& data, bool has_fields) {
             field ? std::optional(field->number(limits::positive(dimension::length))) : std::nullopt};
 }
 
+Machine read_machine(const Entry& experiment, const Curves& data) {
+    Machine machine;
+    for (const MachineNumber& number : machine_numbers()) {
+        if (const auto entry = experiment.find(number.name)) {
+            machine.*number.value = entry->number(number.rule);
+            if ((data.*number.column).empty()) {
+                entry->fail("the data have no such column");
+            }
+        }
+    }
+    return machine;
+}
+
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
-    entry.only({"name", "scene", "data", "fields", "noise", "weight"});
+    entry.only({"name", "scene", "data", "fields", "noise", "weight", "compliance", "force_offset", "displacement_offset"});
     Experiment experiment;
     const auto name = entry.find("name");
     experiment.name = name ? name->text() : fmt::format("experiment {}", number);
@@ -68,6 +83,7 @@ Experiment read_experiment(const Entry& entry, std::size_t number, const Overrid
     if (const auto noise = entry.find("noise")) {
         experiment.noise = read_noise(*noise, experiment.data, experiment.fields.has_value());
     }
+    experiment.machine = read_machine(entry, experiment.data);
     if (const auto weight = entry.find("weight")) {
         experiment.weight = weight->number(limits::positive(dimension::number));
     }
@@ -94,7 +110,7 @@ std::vector<Experiment> read_experiments(const Entry& list, const Overrides& sce
 OptimizerChoice read_optimizer(const Entry& entry) {
     constexpr int most_starts = 10'000;
     constexpr int most_runs = 100'000'000;
-    entry.only({"method", "starts", "max_runs"});
+    entry.only({"method", "loss", "starts", "max_runs"});
     OptimizerChoice optimizer;
     if (const auto method = entry.find("method")) {
         Choices<std::string> choices;
@@ -103,6 +119,9 @@ OptimizerChoice read_optimizer(const Entry& entry) {
             choices.emplace_back(known, known);
         }
         optimizer.method = method->choice(choices);
+    }
+    if (const auto loss = entry.find("loss")) {
+        optimizer.loss = loss->choice<Loss>({{"squares", Loss::squares}, {"huber", Loss::huber}, {"cauchy", Loss::cauchy}});
     }
     if (const auto starts = entry.find("starts")) {
         optimizer.starts = starts->integer(1, most_starts);
@@ -124,6 +143,36 @@ UncertaintyChoice read_uncertainty(const Entry& entry) {
         uncertainty.posterior = posterior->integer(0, most_samples);
     }
     return uncertainty;
+}
+
+/// Reads all scenes once more for each value of the key.
+void read_models(const Entry& entry, const Overrides& scene_overrides, Study& study) {
+    entry.only({"key", "values"});
+    if (study.experiments.empty()) {
+        entry.fail("only a study of experiments can compare models");
+    }
+    study.compared_key = entry.at("key").text();
+    for (const Entry& value : entry.at("values").list()) {
+        ModelChoice& model = study.models.emplace_back();
+        model.name = value.text();
+        for (std::size_t i = 0; i + 1 < study.models.size(); ++i) {
+            if (study.models[i].name == model.name) {
+                value.fail("is given twice");
+            }
+        }
+        Overrides overrides = scene_overrides;
+        overrides.emplace_back(study.compared_key, model.name);
+        for (const Experiment& experiment : study.experiments) {
+            try {
+                model.scenes.push_back(read_scene(experiment.scene.file, overrides));
+            } catch (const InputError& error) {
+                value.fail(fmt::format("does not suit {} of {}: {}", study.compared_key, experiment.scene.file.string(), error.rule));
+            }
+        }
+    }
+    if (study.models.size() < 2) {
+        entry.at("values").fail("at least two values are needed");
+    }
 }
 
 SensitivityChoice read_sensitivity(const Entry& entry) {
@@ -186,6 +235,9 @@ Study read_study(const std::filesystem::path& file, const Overrides& overrides) 
     }
     if (const auto uncertainty = root.find("uncertainty")) {
         study.uncertainty = read_uncertainty(*uncertainty);
+    }
+    if (const auto compare = root.find("compare")) {
+        read_models(*compare, split.scenes, study);
     }
     if (const auto runs = root.find("runs")) {
         runs->only({"time_limit"});

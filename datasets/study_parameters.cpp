@@ -1,4 +1,5 @@
 #include "datasets/error.hpp"
+#include "datasets/machine.hpp"
 #include "datasets/numbers.hpp"
 #include "datasets/study_parts.hpp"
 
@@ -10,9 +11,16 @@
 namespace crampfit {
 namespace {
 
-/// The rule of the number that `key` leads to in at least one of the scenes.
+/// The rule of the number that `key` leads to: of an experiment's machine, or in at least one of the scenes.
 NumberRule find_rule(const Entry& entry, const std::string& key, const Study& study) {
     std::string reason;
+    try {
+        if (const auto found = find_machine_number(study, key, "", "")) {
+            return found->number->rule;
+        }
+    } catch (const InputError& error) {
+        entry.fail(fmt::format("{} {}", key, error.rule));
+    }
     for (const Scene* scene : scenes_of(study)) {
         try {
             return find_number(*scene, key, "", "").rule;
@@ -52,11 +60,32 @@ std::vector<NumberRule> read_keys(const Entry& entry, const Study& study,
     return rules;
 }
 
+/// Fixed ratios: each key is its factor times the parameter's value.
+std::vector<double> read_factors(const Entry& parameter, std::size_t keys) {
+    std::vector<double> factors;
+    if (const auto entry = parameter.find("factors")) {
+        for (const Entry& factor : entry->list()) {
+            factors.push_back(factor.number(limits::finite(dimension::number)));
+            if (factors.back() == 0) {
+                factor.fail("must not be 0");
+            }
+        }
+        if (factors.size() != keys) {
+            entry->fail(fmt::format("must be as many as the keys: {}, not {}", keys, factors.size()));
+        }
+    }
+    return factors;
+}
+
 /// A value that every one of the parameter's keys allows.
-double read_value(const Entry& entry, const std::vector<NumberRule>& rules) {
+double read_value(const Entry& entry, const std::vector<NumberRule>& rules, const Parameter& parameter) {
     double value = 0;
-    for (const NumberRule& rule : rules) {
-        value = entry.number(rule);
+    for (std::size_t k = 0; k < rules.size(); ++k) {
+        const bool same = parameter.factor(k) == 1;
+        value = entry.number(same ? rules[k] : limits::finite(rules[k].dimension));
+        if (!rules[k].allows(value * parameter.factor(k))) {
+            entry.fail(fmt::format("times its factor, {} {}", parameter.keys[k], rules[k].rule));
+        }
     }
     return value;
 }
@@ -72,16 +101,17 @@ std::optional<Prior> read_prior(const Entry& parameter, const Dimension& dimensi
 }
 
 Parameter read_parameter(const Entry& entry, const Study& study) {
-    entry.only({"name", "key", "keys", "initial", "lower", "upper", "scale", "prior"});
+    entry.only({"name", "key", "keys", "factors", "initial", "lower", "upper", "scale", "prior"});
     Parameter parameter;
     const std::vector<NumberRule> rules = read_keys(entry, study, parameter);
+    parameter.factors = read_factors(entry, parameter.keys.size());
     const auto name = entry.find("name");
     parameter.name = name ? name->text() : parameter.keys.front();
     const auto initial = entry.find("initial");
-    parameter.initial = !initial && study.scene ? *find_number(*study.scene, parameter.keys.front(), "", "").value
-                                                : read_value(entry.at("initial"), rules);
-    parameter.lower = read_value(entry.at("lower"), rules);
-    parameter.upper = read_value(entry.at("upper"), rules);
+    parameter.initial = !initial && study.scene ? *find_number(*study.scene, parameter.keys.front(), "", "").value / parameter.factor(0)
+                                                : read_value(entry.at("initial"), rules, parameter);
+    parameter.lower = read_value(entry.at("lower"), rules, parameter);
+    parameter.upper = read_value(entry.at("upper"), rules, parameter);
     const Quantity written = entry.at(initial ? "initial" : "lower").quantity();
     parameter.unit = written.unit;
     parameter.unit_factor = written.factor;

@@ -8,7 +8,7 @@
 
 namespace crampfit {
 
-/// The [[parameters]] of a study; each key must be a number of one of its scenes. `initial` may be left out where the study stands
+/// The [[parameters]] of a study; each key must be a number of one of its scenes or of an experiment's machine. `initial` may be left out where the study stands
 /// on a scene alone, and is the scene's value then. Throws InputError.
 std::vector<Parameter> read_parameters(const Entry& list, const Study& study);
 

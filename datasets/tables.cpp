@@ -1,3 +1,5 @@
+#include "datasets/tables.hpp"
+
 #include "datasets/crack_track.hpp"
 #include "datasets/displacement_field.hpp"
 #include "datasets/error.hpp"
@@ -186,6 +188,29 @@ Table checks_table(const Fit& fit) {
     return table;
 }
 
+Table distances_table(const Fit& fit) {
+    Table table{{"experiment", "kind", "area_measured", "area_modelled", "area_between", "frechet"}};
+    for (const CurveDistance& distance : fit.distances)
+        table.push_back({distance.experiment, distance.kind, text_of(distance.area_measured), text_of(distance.area_modelled),
+                         text_of(distance.area_between), text_of(distance.frechet)});
+    return table;
+}
+
+Table models_table(const Fit& fit) {
+    Table table{{"model", "status", "misfit", "AIC", "BIC", "weight"}};
+    for (const FittedParameter& parameter : fit.parameters)
+        table.front().push_back(parameter.name);
+    for (const ComparedModel& model : fit.models) {
+        Row& row = table.emplace_back();
+        row.insert(row.end(), {model.name, model.status});
+        for (const double number : {model.misfit, model.aic, model.bic, model.weight})
+            row.push_back(text_of(number));
+        for (const double value : model.values)
+            row.push_back(text_of(value));
+    }
+    return table;
+}
+
 Table profile_table(const Fit& fit) {
     Table table{{"parameter", "value", "misfit"}};
     for (const ProfilePoint& point : fit.profile)
@@ -213,6 +238,8 @@ std::vector<Offer> offers(const Fit& fit) {
             {"residuals", [&] { return residuals_table(fit); }},
             {"correlation", [&] { return correlation_table(fit); }},
             {"checks", [&] { return checks_table(fit); }},
+            {"distances", [&] { return distances_table(fit); }},
+            {"models", [&] { return models_table(fit); }},
             {"profile", [&] { return profile_table(fit); }},
             {"posterior", [&] { return posterior_table(fit); }}};
 }
@@ -352,6 +379,13 @@ std::vector<Offer> offers(const CrackTrack& track) {
             {"experiment", [&] { return curves_table(curves_of(track)); }}};
 }
 
+template <class Result> std::vector<std::string> names_of(const Result& result) {
+    std::vector<std::string> names;
+    for (const Offer& offer : offers(result))
+        names.push_back(offer.name);
+    return names;
+}
+
 void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path& file, const std::string& wanted,
                   std::ostream& out) {
     std::vector<std::string> names;
@@ -366,6 +400,16 @@ void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path&
 }
 
 }  // namespace
+
+std::vector<std::string> table_names(const Record& record) { return names_of(record); }
+std::vector<std::string> table_names(const Fit& fit) { return names_of(fit); }
+std::vector<std::string> table_names(const Sensitivity& sensitivity) { return names_of(sensitivity); }
+
+void print_table(const Record& record, const std::string& table, std::ostream& out) { print_one_of(offers(record), "the record", table, out); }
+void print_table(const Fit& fit, const std::string& table, std::ostream& out) { print_one_of(offers(fit), "the fit", table, out); }
+void print_table(const Sensitivity& sensitivity, const std::string& table, std::ostream& out) {
+    print_one_of(offers(sensitivity), "the sensitivity study", table, out);
+}
 
 void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out) {
     const std::string kind = hdf5::open(file).attribute("kind");

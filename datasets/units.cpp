@@ -26,6 +26,7 @@ constexpr std::array named_dimensions{
     NamedDimension{dimension::velocity, "a velocity", "1 mm/min"},
     NamedDimension{dimension::rate, "a rate", "2e4 1/s"},
     NamedDimension{dimension::force, "a force", "2 N"},
+    NamedDimension{dimension::compliance, "a compliance", "0.5 um/N"},
     NamedDimension{dimension::pressure, "a pressure", "40 MPa"},
     NamedDimension{dimension::density, "a density", "300 kg/m^3"},
     NamedDimension{dimension::energy_release_rate, "an energy per area", "100 J/m^2"},

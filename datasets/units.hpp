@@ -23,6 +23,7 @@ inline constexpr Dimension angle{0, 0, 0, 1};
 inline constexpr Dimension velocity{1, 0, -1, 0};
 inline constexpr Dimension rate{0, 0, -1, 0};
 inline constexpr Dimension force{1, 1, -2, 0};
+inline constexpr Dimension compliance{0, -1, 2, 0};
 inline constexpr Dimension pressure{-1, 1, -2, 0};
 inline constexpr Dimension density{-3, 1, 0, 0};
 inline constexpr Dimension energy_release_rate{0, 1, -2, 0};

@@ -26,6 +26,10 @@ class KeptWalk {
     /// friction, where a state hangs on the way to it.
     bool reusable() const { return reusable_; }
 
+    /// Whether states are found by themselves. Else each is found from those found before, and depends on them by what Newton's
+    /// method leaves: so does what a run gives.
+    bool linear() const { return plan_.linear; }
+
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
     /// with the equilibria that are known, where it can. Probes are solved for, and read as for the first scene's numbers. One run at a
     /// time: others wait.

@@ -1,6 +1,7 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/explore.hpp"
 #include "inverse/kept_walks.hpp"
@@ -10,6 +11,7 @@
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
 #include "inverse/walk_descent.hpp"
+#include "inverse/walk_slopes.hpp"
 
 #include <fmt/format.h>
 
@@ -25,11 +27,6 @@ namespace {
 
 constexpr double bound_tolerance = 1e-4;  // of the box
 constexpr int most_cheap_runs = 1000000;  // of those that take milliseconds
-
-// Displacements at which a crack moves differ by this much from grid to grid: in explicit dynamics for vibration and for arrests
-// between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
-// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more).
-constexpr double solver_resolution = 0.02;
 
 using Clock = std::chrono::steady_clock;
 
@@ -159,25 +156,33 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const bool own = !options.forward;
     const int threads = thread_count(options.threads);
     const KeptWalks walks(study, std::max(1, threads / std::max(1, static_cast<int>(study.experiments.size()))));
-    const StudyModel model(study, own ? walks.exact() : options.forward, own ? solver_resolution : 0.0, options.stop_requested);
     const bool only_toughness = own && walks.only_toughness();
     const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
-    const auto by_walk_of = [&](Forward (KeptWalks::*forward)(const std::vector<double>&) const) -> Near {
-        return [&, forward](const Eigen::VectorXd& point) -> Objective::Evaluate {
+    // The same bits for any number of threads: runs that go on from one another are made one after the other.
+    const bool on_walks = by_walks || only_toughness;
+    const bool in_order = on_walks && walks.depend_on_order();
+    const Forward forward = !own ? options.forward : on_walks ? walks.exact() : walks.in_any_order();
+    const StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
+    const auto by_walk_of = [&](Forward (KeptWalks::*runs)(const std::vector<double>&) const) -> Near {
+        return [&, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
             const Eigen::VectorXd values = model.box().values(point);
-            auto close = std::make_shared<StudyModel>(study, (walks.*forward)({values.begin(), values.end()}), solver_resolution, options.stop_requested);
-            return [close](const Eigen::VectorXd& x, int with) { return close->evaluate(x, with); };
+            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), solver_resolution, options.stop_requested);
+            return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
         };
     };
     const Near near = by_walk_of(&KeptWalks::near);
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
+    // Steps on walks go on from the one before, where the walks are.
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
+                   by_walks || in_order ? nullptr : options.farm);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int with) {
-            return store.at(box.values(x), [&] { return model.evaluate(x, with); });
+        box.size(), [&](const Eigen::VectorXd& x, int share) {
+            const Eigen::VectorXd values = box.values(x);
+            return store.at(values, [&] { return shared(values, share); });
         },
-        study.optimizer.max_runs, threads, options.stop_requested,
+        study.optimizer.max_runs, in_order ? 1 : shared.places(), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
 
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
@@ -257,11 +262,28 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
+        fit.distances = curve_distances(fit.residuals);
         fit.message += lack_of_fit(fit.checks) + model.remarks();
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);
     return fit;
+}
+
+StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
+    const auto kept = std::make_shared<const Study>(study);
+    const auto model = std::make_shared<StudyModel>(*kept, KeptWalks(*kept).in_any_order(), solver_resolution, stop);
+    return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
+}
+
+std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    const KeptWalks walks(study);
+    if (!walks.has_exact_slopes()) {
+        return std::nullopt;
+    }
+    const StudyModel near(study, walks.near({values.begin(), values.end()}), solver_resolution, stop);
+    const auto slopes = walk_slopes([&](const Eigen::VectorXd& v) { return near.at(v, 1); }, values, study.parameters);
+    return slopes ? std::optional(slopes->mean()) : std::nullopt;
 }
 
 }  // namespace crampfit

@@ -2,11 +2,13 @@
 
 #include "datasets/experiment.hpp"
 #include "datasets/fit.hpp"
+#include "inverse/farm.hpp"
 #include "inverse/forward.hpp"
 #include "inverse/run_store.hpp"
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,7 +32,8 @@ struct FitOptions {
     std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random
-    RunKeeping keeping;  // of the forward runs, as they end
+    RunKeeping keeping;      // of the forward runs, as they end
+    Farm* farm = nullptr;    // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
 
     /// Throws InputError naming the option that is out of range.
     void validate() const;
@@ -42,5 +45,12 @@ struct FitOptions {
 /// `Fit::runs` and the fit goes on. Throws InputError for a study that cannot be fitted as it asks, before anything
 /// runs.
 Fit fit_study(const Study& study, const FitOptions& options = {});
+
+/// The residuals that `fit_study` makes small, for those who drive the study themselves. It keeps a copy of the study; `stop` may
+/// be null. Throws as `fit_study` does.
+StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop = nullptr);
+
+/// Their derivatives by the parameters. Absent where there are none, or a run failed.
+std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace crampfit

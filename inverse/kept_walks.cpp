@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "datasets/machine.hpp"
 #include "forward/kept_walk.hpp"
 
 #include <fmt/format.h>
@@ -19,6 +20,7 @@ constexpr std::size_t most_walks = 6;
 struct Setting {
     std::string key;
     std::size_t parameter;
+    double factor;   // of its value
     double initial;  // SI
 };
 
@@ -40,8 +42,13 @@ class KeptWalks::Store {
             scenes_.push_back(scene);
         }
         for (std::size_t j = 0; j < study.parameters.size(); ++j) {
-            for (const std::string& key : study.parameters[j].keys) {
-                (key.ends_with(".toughness") ? toughness_ : others_).push_back({key, j, study.parameters[j].initial});
+            const Parameter& parameter = study.parameters[j];
+            for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
+                const std::string& key = parameter.keys[k];
+                if (!find_machine_number(study, key, study.file.string(), "(any)")) {  // these change no walk
+                    const double factor = parameter.factor(k);
+                    (key.ends_with(".toughness") ? toughness_ : others_).push_back({key, j, factor, factor * parameter.initial});
+                }
             }
         }
     }
@@ -53,7 +60,7 @@ class KeptWalks::Store {
         Scene base = scene;
         for (const Setting& setting : others_) {
             if (has(base, setting.key)) {
-                set_number(base, setting.key, values[setting.parameter]);
+                set_number(base, setting.key, setting.factor * values[setting.parameter]);
             }
         }
         return run(base, scene, rough, stop);
@@ -66,6 +73,27 @@ class KeptWalks::Store {
     bool has_slopes() const {
         const bool of_wood = std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
         return of_wood && !has_probes() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
+    }
+
+    bool depend_on_order() const {
+        return std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) {
+            const KeptWalk walk(*scene);
+            return walk.reusable() && !walk.linear();
+        });
+    }
+
+    bool has_exact_slopes() const {
+        if (others_.empty() ? !only_toughness() : !has_slopes()) {
+            return false;
+        }
+        return std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) {
+            return std::all_of(scene->cracks.begin(), scene->cracks.end(), [&](const Crack& crack) {
+                const bool turns_with_moduli = crack.direction != GrowthDirection::straight;
+                const bool turns_with_toughness = crack.direction == GrowthDirection::energy_release_rate;
+                return crack.grows == Growth::none ||
+                       !((turns_with_moduli && !others_.empty()) || (turns_with_toughness && !toughness_.empty()));
+            });
+        });
     }
 
   private:
@@ -135,6 +163,19 @@ Forward KeptWalks::exact() const {
     return [store = store_](const Scene& scene, const std::atomic<bool>* stop) { return store->run(scene, stop); };
 }
 
+Forward KeptWalks::in_any_order() const {
+    if (!depend_on_order()) {
+        return exact();
+    }
+    return [](const Scene& scene, const std::atomic<bool>* stop) {
+        SimulateOptions options;
+        options.stop_requested = stop;
+        return simulate(scene, options);
+    };
+}
+
+bool KeptWalks::depend_on_order() const { return store_->depend_on_order(); }
+
 Forward KeptWalks::near(const std::vector<double>& values) const {
     return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, false, stop); };
 }
@@ -145,5 +186,6 @@ Forward KeptWalks::rough(const std::vector<double>& values) const {
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
+bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }
 
 }  // namespace crampfit

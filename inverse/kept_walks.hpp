@@ -19,6 +19,12 @@ class KeptWalks {
     /// The simulation itself, on a walk of its own where the scene has other moduli than any that is kept.
     Forward exact() const;
 
+    /// The simulation for runs that are made side by side: on walks only where it does not matter which run comes first.
+    Forward in_any_order() const;
+
+    /// Whether runs on walks depend on the runs before, in their last digits.
+    bool depend_on_order() const;
+
     /// The simulation near a point of the study, `values` of its parameters, on the walk of that point: exact for toughness, to first
     /// order for all other parameters, which takes milliseconds once that walk is there.
     Forward near(const std::vector<double>& values) const;
@@ -31,6 +37,10 @@ class KeptWalks {
 
     /// Whether walks have derivatives by all other parameters.
     bool has_slopes() const;
+
+    /// Whether those, and small differences of toughness, are derivatives of all that a run gives: not where the parameters turn the
+    /// crack's way.
+    bool has_exact_slopes() const;
 
   private:
     class Store;

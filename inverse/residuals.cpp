@@ -221,8 +221,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     }
 }
 
-Eigen::VectorXd Comparison::modelled(const Record& record) const {
-    std::vector<double> values = fields_ && fields_->stations().size() == stations_.size() ? std::vector<double>{} : on_curves(record);
+Eigen::VectorXd Comparison::modelled(const Record& record, double slack_force) const {
+    std::vector<double> values = fields_ && fields_->stations().size() == stations_.size() ? std::vector<double>{} : on_curves(record, slack_force);
     if (fields_) {
         const std::vector<double> of_fields = fields_->modelled(record);
         values.insert(values.end(), of_fields.begin(), of_fields.end());
@@ -230,7 +230,7 @@ Eigen::VectorXd Comparison::modelled(const Record& record) const {
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-std::vector<double> Comparison::on_curves(const Record& record) const {
+std::vector<double> Comparison::on_curves(const Record& record, double slack_force) const {
     std::vector<double> abscissa, forces, lengths;
     for (const Instant& instant : record.series) {
         abscissa.push_back(by_time_ ? instant.time : instant.displacement);
@@ -239,7 +239,7 @@ std::vector<double> Comparison::on_curves(const Record& record) const {
     }
     Curve force(abscissa, forces);
     if (record.status == RunStatus::split) {
-        force.continue_with(0.0);
+        force.continue_with(slack_force);
     }
     // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
     const double end = *std::max_element(abscissa.begin(), abscissa.end());

@@ -30,7 +30,7 @@ class Curve;
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
 ///
-/// Force is compared where data exist. After the end of a Record the force is 0 if the specimen split, else the last
+/// Force is compared where data exist. After the end of a Record the force is that of a slack machine if the specimen split, else the last
 /// one.
 class Comparison {
   public:
@@ -46,14 +46,15 @@ class Comparison {
     const std::vector<FitResidual>& stations() const { return stations_; }
 
     /// What the record has at each station [stations], SI. All finite if the record's numbers are.
-    Eigen::VectorXd modelled(const Record& record) const;
+    /// `slack_force` is what the load cell says once the specimen has split [N].
+    Eigen::VectorXd modelled(const Record& record, double slack_force = 0.0) const;
 
     /// What a person should know about how the data was used, such as noise that had to be estimated.
     const std::vector<std::string>& remarks() const { return remarks_; }
 
   private:
     void add_curves(const Experiment& experiment);
-    std::vector<double> on_curves(const Record& record) const;
+    std::vector<double> on_curves(const Record& record, double slack_force) const;
     void add_force_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment);
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows,

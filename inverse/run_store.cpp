@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "datasets/machine.hpp"
 
 #include <fmt/format.h>
 
@@ -34,13 +35,16 @@ std::uint64_t fingerprint(const Study& study) {
             print.add(sigma.value_or(0.0));
         }
         print.add(experiment.weight);
+        for (const MachineNumber& number : machine_numbers()) {
+            print.add(experiment.machine.*number.value);
+        }
     }
     for (const StudyOutput& output : study.outputs) {
         print.add(output.name);
     }
     for (const Parameter& parameter : study.parameters) {
-        for (const std::string& key : parameter.keys) {
-            print.add(key);
+        for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
+            print.add(parameter.keys[k]).add(parameter.factor(k));
         }
         if (parameter.prior) {
             print.add(parameter.prior->mean).add(parameter.prior->sd);
@@ -145,10 +149,11 @@ std::string failure_text(const Study& study, const Eigen::VectorXd& values, cons
             text += " --set " + quoted_for_shell(key + "=" + value);
         }
         for (std::size_t j = 0; j < study.parameters.size(); ++j) {
-            for (const std::string& key : study.parameters[j].keys) {
-                if (knows(*scene, key)) {
-                    text += " --set " +
-                            quoted_for_shell(key + "=" + with_unit(values[static_cast<Eigen::Index>(j)], study.parameters[j]));
+            const Parameter& parameter = study.parameters[j];
+            for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
+                if (knows(*scene, parameter.keys[k])) {
+                    const double value = parameter.factor(k) * values[static_cast<Eigen::Index>(j)];
+                    text += " --set " + quoted_for_shell(parameter.keys[k] + "=" + with_unit(value, parameter));
                 }
             }
         }

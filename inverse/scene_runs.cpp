@@ -2,12 +2,16 @@
 
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "inverse/machine.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
+#include <future>
+#include <mutex>
 #include <thread>
 
 namespace crampfit {
@@ -48,18 +52,38 @@ class TimeLimit {
 
 }  // namespace
 
+/// The last records of each scene, by the numbers that were set in it; those that are on their way too.
+struct SceneRuns::Kept {
+    static constexpr std::size_t most = 8;  // a scene
+
+    using Entry = std::pair<std::vector<double>, std::shared_future<Outcome>>;
+
+    std::mutex mutex;
+    std::vector<std::deque<Entry>> of_scene;
+};
+
 SceneRuns::SceneRuns(const Study& study, Forward forward, const std::atomic<bool>* stop)
-    : scenes_(scenes_of(study)), forward_(std::move(forward)), stop_(stop), time_limit_(study.time_limit),
-      settings_(scenes_.size()) {
+    : scenes_(scenes_of(study)), machines_(scenes_.size()), forward_(std::move(forward)), stop_(stop), time_limit_(study.time_limit),
+      settings_(scenes_.size()), kept_(std::make_shared<Kept>()) {
+    kept_->of_scene.resize(scenes_.size());
+    for (std::size_t i = 0; i < study.experiments.size(); ++i) {
+        machines_[i] = study.experiments[i].machine;
+    }
     // A scene without latewood has no use for its toughness; some scene must have each key.
     for (std::size_t j = 0; j < study.parameters.size(); ++j) {
-        for (const std::string& key : study.parameters[j].keys) {
+        for (std::size_t k = 0; k < study.parameters[j].keys.size(); ++k) {
+            const std::string& key = study.parameters[j].keys[k];
+            const Setting setting{static_cast<Eigen::Index>(j), study.parameters[j].factor(k), key};
+            if (const auto found = find_machine_number(study, key, study.file.string(), "(any)")) {
+                settings_[found->experiment].push_back({setting.parameter, setting.factor, key, found->number});
+                continue;
+            }
             std::optional<InputError> unknown;
             bool found = false;
             for (std::size_t i = 0; i < scenes_.size(); ++i) {
                 try {
                     get_number(*scenes_[i], key);
-                    settings_[i].emplace_back(static_cast<Eigen::Index>(j), key);
+                    settings_[i].push_back(setting);
                     found = true;
                 } catch (const InputError& error) {
                     unknown = error;
@@ -73,12 +97,62 @@ SceneRuns::SceneRuns(const Study& study, Forward forward, const std::atomic<bool
 }
 
 SceneRuns::Outcome SceneRuns::run(std::size_t number, const Eigen::VectorXd& values) const {
+    std::vector<double> numbers;
+    Machine machine = machines_[number];
+    for (const Setting& setting : settings_[number]) {
+        const double value = setting.factor * values[setting.parameter];
+        if (setting.of_machine) {
+            machine.*setting.of_machine->value = value;
+        } else {
+            numbers.push_back(value);
+        }
+    }
+    Outcome outcome = once(number, numbers);
+    const bool seen_through = machine.compliance != 0 || machine.force_offset != 0 || machine.displacement_offset != 0;
+    if (outcome.record && seen_through) {
+        outcome.record = std::make_shared<const Record>(as_recorded(*outcome.record, machine));
+        outcome.machine = machine;
+    }
+    return outcome;
+}
+
+// The kept outcome, which cost nothing now, or one to be kept.
+SceneRuns::Outcome SceneRuns::once(std::size_t number, const std::vector<double>& numbers) const {
+    std::promise<Outcome> promise;
+    std::shared_future<Outcome> known;
+    {
+        const std::lock_guard lock(kept_->mutex);
+        std::deque<Kept::Entry>& entries = kept_->of_scene[number];
+        const auto entry = std::find_if(entries.begin(), entries.end(), [&](const Kept::Entry& e) { return e.first == numbers; });
+        if (entry != entries.end()) {
+            known = entry->second;
+        } else {
+            entries.emplace_back(numbers, promise.get_future().share());
+            if (entries.size() > Kept::most) {
+                entries.pop_front();
+            }
+        }
+    }
+    if (known.valid()) {
+        Outcome outcome = known.get();
+        outcome.seconds = 0;
+        return outcome;
+    }
+    const Outcome outcome = run_scene(number, numbers);
+    promise.set_value(outcome);
+    return outcome;
+}
+
+SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const std::vector<double>& numbers) const {
     const auto begin = std::chrono::steady_clock::now();
     Outcome outcome;
     try {
         Scene scene = *scenes_[number];
-        for (const auto& [parameter, key] : settings_[number]) {
-            set_number(scene, key, values[parameter]);
+        std::size_t next = 0;
+        for (const Setting& setting : settings_[number]) {
+            if (!setting.of_machine) {
+                set_number(scene, setting.key, numbers[next++]);
+            }
         }
         TimeLimit limit(time_limit_, stop_);
         Record record = forward_(scene, limit.stop());
@@ -93,7 +167,7 @@ SceneRuns::Outcome SceneRuns::run(std::size_t number, const Eigen::VectorXd& val
                               : record.message.empty() ? ""
                                                        : ": " + record.message;
         } else {
-            outcome.record = std::move(record);
+            outcome.record = std::make_shared<const Record>(std::move(record));
         }
     } catch (const std::exception& error) {
         outcome.status = error.what();

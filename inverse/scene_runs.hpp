@@ -1,18 +1,20 @@
 #pragma once
 
 #include "datasets/experiment.hpp"
+#include "datasets/machine.hpp"
 #include "inverse/forward.hpp"
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace crampfit {
 
-/// The scenes of a study, made ready to be run with any values of its parameters.
+/// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes but
+/// the machine that it is tested on, or another scene: the last records of each are kept.
 class SceneRuns {
   public:
     /// Throws InputError for a key that no scene has. The study must outlive this; `stop` may be null.
@@ -20,7 +22,8 @@ class SceneRuns {
 
     struct Outcome {
         std::string status;
-        std::optional<Record> record;  // of a run that ended well: finite numbers to the end
+        std::shared_ptr<const Record> record;  // of a run that ended well: finite numbers to the end; null for others
+        Machine machine;                       // that the record has been seen through
         double seconds = 0;
     };
 
@@ -30,11 +33,24 @@ class SceneRuns {
     Outcome run(std::size_t scene, const Eigen::VectorXd& values) const;
 
   private:
+    struct Setting {
+        Eigen::Index parameter;
+        double factor;
+        std::string key;                               // of the scene
+        const MachineNumber* of_machine = nullptr;     // instead of a key
+    };
+    struct Kept;
+
+    Outcome run_scene(std::size_t scene, const std::vector<double>& numbers) const;
+    Outcome once(std::size_t scene, const std::vector<double>& numbers) const;
+
     std::vector<const Scene*> scenes_;
+    std::vector<Machine> machines_;  // of the experiments; none for a scene alone
     Forward forward_;
     const std::atomic<bool>* stop_;
     std::optional<double> time_limit_;  // [s]
-    std::vector<std::vector<std::pair<Eigen::Index, std::string>>> settings_;  // parameter and key, for each scene
+    std::vector<std::vector<Setting>> settings_;  // of each scene
+    std::shared_ptr<Kept> kept_;
 };
 
 }  // namespace crampfit

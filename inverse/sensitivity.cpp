@@ -5,12 +5,12 @@
 #include "inverse/local_design.hpp"
 #include "inverse/morris.hpp"
 #include "inverse/objective.hpp"
-#include "inverse/outputs.hpp"
+#include "inverse/output_model.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/saltelli.hpp"
-#include "inverse/scene_runs.hpp"
 #include "inverse/study_check.hpp"
 #include "inverse/unit_box.hpp"
+#include "inverse/walk_slopes.hpp"
 
 #include <fmt/format.h>
 
@@ -24,54 +24,6 @@ namespace {
 
 constexpr int default_rows = 512;         // of Sobol's method
 constexpr int default_trajectories = 20;  // of Morris' method
-
-/// The outputs of a study as a function on its unit cube.
-class OutputModel {
-  public:
-    OutputModel(const Study& study, Forward forward, const std::atomic<bool>* stop)
-        : study_(study), runs_(study, std::move(forward), stop), box_(study.parameters) {
-        for (std::size_t i = 0; i < runs_.size(); ++i) {
-            for (const StudyOutput& output : study.outputs) {
-                names_.push_back({runs_.size() > 1 ? study.experiments[i].name + ": " + output.name : output.name,
-                                  unit_of(output.kind)});
-            }
-        }
-    }
-
-    const UnitBox& box() const { return box_; }
-    const std::vector<StudiedOutput>& names() const { return names_; }
-
-    /// `residuals` are the outputs; empty when a scene's run failed.
-    Evaluation evaluate(const Eigen::VectorXd& x, int threads) const {
-        const Eigen::VectorXd values = box_.values(x);
-        std::vector<SceneRuns::Outcome> outcomes(runs_.size());
-        parallel_for(static_cast<int>(outcomes.size()), threads,
-                     [&](int i) { outcomes[static_cast<std::size_t>(i)] = runs_.run(static_cast<std::size_t>(i), values); });
-        Evaluation result;
-        std::vector<double> outputs;
-        bool good = true;
-        for (std::size_t i = 0; i < outcomes.size(); ++i) {
-            const SceneRuns::Outcome& outcome = outcomes[i];
-            const std::string who = outcomes.size() > 1 ? study_.experiments[i].name + ": " : "";
-            result.status += (result.status.empty() ? "" : "; ") + who + outcome.status;
-            result.seconds += outcome.seconds;
-            good = good && outcome.record;
-            for (std::size_t k = 0; good && k < study_.outputs.size(); ++k) {
-                outputs.push_back(output_of(*outcome.record, study_.outputs[k]));
-            }
-        }
-        if (good) {
-            result.residuals = Eigen::Map<Eigen::VectorXd>(outputs.data(), static_cast<Eigen::Index>(outputs.size()));
-        }
-        return result;
-    }
-
-  private:
-    const Study& study_;
-    SceneRuns runs_;
-    UnitBox box_;
-    std::vector<StudiedOutput> names_;
-};
 
 using Evaluations = std::vector<std::shared_ptr<const Evaluation>>;
 
@@ -111,21 +63,49 @@ std::vector<Estimate> scaled(std::vector<Estimate> estimates, const std::vector<
     return estimates;
 }
 
-// Derivatives by the parameters in their units, and elasticities: p / y dy/dp.
-void add_local(Indices& indices, std::size_t output, const UnitBox& box, const Eigen::VectorXd& x,
-               const std::vector<Estimate>& by_x, double value) {
-    std::vector<double> by_parameter, relative;
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        const double slope = box.slope(j, x[j]);
-        by_parameter.push_back(box.parameters()[static_cast<std::size_t>(j)].unit_factor / slope);
-        relative.push_back(box.value(j, x[j]) / slope / value);
+// From derivatives by the parameters in SI, those by the parameters in their units, and elasticities: p / y dy/dp.
+void add_local(Indices& indices, std::size_t output, const UnitBox& box, const std::vector<Estimate>& by_si, double value) {
+    std::vector<double> units, relative;
+    for (const Parameter& parameter : box.parameters()) {
+        units.push_back(parameter.unit_factor);
+        relative.push_back(parameter.initial / value);
     }
-    indices.add(output, "derivative", scaled(by_x, by_parameter));
-    indices.add(output, "elasticity", scaled(by_x, relative));
+    indices.add(output, "derivative", scaled(by_si, units));
+    indices.add(output, "elasticity", scaled(by_si, relative));
 }
 
-// Runs what the method asks for, and makes of it what it gives.
-void apply_method(const Study& study, const UnitBox& box, Objective& objective, unsigned seed, Sensitivity& result) {
+// By differences of whole runs.
+void add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design, const std::vector<double>& values) {
+    const Eigen::VectorXd& x = design.points().front();
+    std::vector<double> to_si;
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        to_si.push_back(1.0 / box.slope(j, x[j]));
+    }
+    add_local(indices, output, box, scaled(design.derivatives(values), to_si), values.front());
+}
+
+// On the walk of one run; the interval spans what is seen from either side.
+void add_slopes(Indices& indices, std::size_t output, const UnitBox& box, const WalkSlopes& slopes, double value) {
+    const auto row = static_cast<Eigen::Index>(output);
+    std::vector<Estimate> by_si;
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        const double below = slopes.from_below(row, j), above = slopes.from_above(row, j);
+        by_si.push_back({0.5 * (below + above), below, above});
+    }
+    add_local(indices, output, box, by_si, value);
+}
+
+std::optional<WalkSlopes> slopes_at(const Study& study, const KeptWalks& walks, const Eigen::VectorXd& values,
+                                    const std::atomic<bool>* stop) {
+    const OutputModel near(study, walks.near({values.begin(), values.end()}), stop);
+    return walk_slopes([&](const Eigen::VectorXd& v) { return near.at(v, 1); }, values, study.parameters);
+}
+
+using Slopes = std::function<std::optional<WalkSlopes>()>;
+
+// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where the
+// solver has none.
+void apply_method(const Study& study, const UnitBox& box, Objective& objective, const Slopes& slopes, unsigned seed, Sensitivity& result) {
     const int samples = study.sensitivity.samples;
     Indices indices(result, study.sensitivity.method);
     const auto for_each_output = [&](const std::vector<Eigen::VectorXd>& points, const auto& add) {
@@ -136,10 +116,18 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
     };
     switch (study.sensitivity.method) {
     case SensitivityMethod::local: {
-        // Derivatives that a solver gives exactly would take the place of these differences.
+        if (slopes) {
+            const std::optional<WalkSlopes> exact = slopes();
+            for_each_output({box.initial()}, [&](std::size_t k, const std::vector<double>& values) {
+                if (exact) {
+                    add_slopes(indices, k, box, *exact, values.front());
+                }
+            });
+            break;
+        }
         const LocalDesign design(box.initial());
         for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
-            add_local(indices, k, box, design.points().front(), design.derivatives(values), values.front());
+            add_differences(indices, k, box, design, values);
         });
         break;
     }
@@ -165,12 +153,12 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
 }
 
 // How many runs the method takes, those at the same point counted each time.
-int runs_of(const Study& study) {
+int runs_of(const Study& study, bool has_slopes) {
     const int p = static_cast<int>(study.parameters.size());
     const int samples = study.sensitivity.samples;
     switch (study.sensitivity.method) {
     case SensitivityMethod::local:
-        return 1 + 4 * p;
+        return has_slopes ? 1 : 1 + 4 * p;
     case SensitivityMethod::morris:
         return (samples > 0 ? samples : default_trajectories) * (p + 1);
     case SensitivityMethod::sobol:
@@ -239,10 +227,19 @@ void SensitivityOptions::validate() const {
 
 Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& options) {
     options.validate();
-    check_sensitivity_study(study);
     const auto begin = std::chrono::steady_clock::now();
-    const OutputModel model(study, options.forward ? options.forward : KeptWalks(study).exact(),
-                            options.stop_requested);
+    check_sensitivity_study(study);
+    const KeptWalks walks(study);
+    const bool own = !options.forward;
+    // The same bits for any number of threads: runs that go on from one another are made one after the other.
+    const bool in_order = own && walks.only_toughness() && walks.depend_on_order();
+    const Forward forward = !own ? options.forward : in_order ? walks.exact() : walks.in_any_order();
+    const OutputModel model(study, forward, options.stop_requested);
+    const int threads = thread_count(options.threads);
+    Slopes slopes;
+    if (own && walks.has_exact_slopes()) {
+        slopes = [&] { return slopes_at(study, walks, model.box().values(model.box().initial()), options.stop_requested); };
+    }
     Sensitivity result;
     result.seed = options.seed;
     result.study_text = study.text;
@@ -250,14 +247,17 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     fill_parameters(model.box(), result);
 
     SensitivityProgress progress;
-    progress.planned = runs_of(study);
+    progress.planned = runs_of(study, slopes != nullptr);
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
+                   in_order ? nullptr : options.farm);
     RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
         model.box().size(),
-        [&](const Eigen::VectorXd& x, int threads) {
-            return store.at(model.box().values(x), [&] { return model.evaluate(x, threads); });
+        [&](const Eigen::VectorXd& x, int share) {
+            const Eigen::VectorXd values = model.box().values(x);
+            return store.at(values, [&] { return shared(values, share); });
         },
-        progress.planned, thread_count(options.threads), options.stop_requested, [&](const Run& run) {
+        progress.planned, in_order ? 1 : shared.places(), options.stop_requested, [&](const Run& run) {
             ++progress.runs;
             progress.failed += run.evaluation->usable() ? 0 : 1;
             progress.failure = failure_text(study, model.box().values(run.x), *run.evaluation);
@@ -265,11 +265,26 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
                 options.progress(progress);
             }
         });
-    apply_method(study, model.box(), objective, options.seed, result);
+    apply_method(study, model.box(), objective, slopes, options.seed, result);
     fill_runs(model.box(), objective.runs(), result);
     conclude(objective.runs(), objective.stopped(), result);
+    if (slopes && !result.indices.empty()) {
+        result.message += "; derivatives are exact, by the solver";
+    }
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return result;
+}
+
+StudyFunction output_function(const Study& study, const std::atomic<bool>* stop) {
+    const auto kept = std::make_shared<const Study>(study);
+    const auto model = std::make_shared<OutputModel>(*kept, KeptWalks(*kept).in_any_order(), stop);
+    return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
+}
+
+std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    const KeptWalks walks(study);
+    const auto slopes = walks.has_exact_slopes() ? slopes_at(study, walks, values, stop) : std::nullopt;
+    return slopes ? std::optional(slopes->mean()) : std::nullopt;
 }
 
 }  // namespace crampfit

@@ -2,11 +2,13 @@
 
 #include "datasets/experiment.hpp"
 #include "datasets/sensitivity.hpp"
+#include "inverse/farm.hpp"
 #include "inverse/forward.hpp"
 #include "inverse/run_store.hpp"
 
 #include <atomic>
 #include <functional>
+#include <optional>
 
 namespace crampfit {
 
@@ -23,7 +25,8 @@ struct SensitivityOptions {
     std::function<void(const SensitivityProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;          // set from outside: the study ends with what it has
     unsigned seed = 1;                                          // of everything that is drawn at random
-    RunKeeping keeping;  // of the forward runs, as they end
+    RunKeeping keeping;    // of the forward runs, as they end
+    Farm* farm = nullptr;  // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
 
     /// Throws InputError naming the option that is out of range.
     void validate() const;
@@ -35,5 +38,12 @@ struct SensitivityOptions {
 /// The result depends on the study and the seed, not on the number of threads. A forward run that fails is recorded and left out.
 /// Throws InputError for a study that cannot be made as it asks, before anything runs.
 Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& options = {});
+
+/// The outputs that `study_sensitivity` looks at, for those who drive the study themselves. It keeps a copy of the study; `stop`
+/// may be null. Throws as `study_sensitivity` does.
+StudyFunction output_function(const Study& study, const std::atomic<bool>* stop = nullptr);
+
+/// Their derivatives by the parameters. Absent where there are none, or a run failed.
+std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace crampfit

@@ -103,6 +103,9 @@ inline Fit full_fit() {
     fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5},
                      {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
     fit.runs = {{{80.0, 120.0}, infinite, "unstable", 0.5}, {{103.25, not_a_number}, 12.75, "finished", 0.625}};
+    fit.distances = {{"wedge 1", "force", 1.0 / 3.0, 0.25, -0.0, not_a_number}};
+    fit.models = {{"hoop stress", "converged", 1.0 / 3.0, {0.1, 0.2}, 4.3, 5.4, 0.9},
+                  {"straight", "failed", infinite, {0.3, 0.4}, infinite, infinite, 0.0}};
     fit.checks = {{"wedge 1", "force", 50, 12.5, 1.0 / 3.0, -0.0, not_a_number}};
     fit.profile = {{"EW, toughness", 80.5, infinite}, {"LW \"hard\"", -0.0, 1.0 / 3.0}};
     fit.posterior = {{{80.0, 1.0 / 3.0}, 12.75}, {{infinite, -0.0}, 13.0}};

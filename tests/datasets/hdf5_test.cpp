@@ -128,6 +128,18 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
         return std::vector{c.chi_square, c.p_chi_square, c.autocorrelation, c.p_autocorrelation};
     };
     EXPECT_TRUE(same_bits(numbers(after.checks[0]), numbers(before.checks[0])));
+    ASSERT_EQ(after.distances.size(), before.distances.size());
+    const auto distance = [](const CurveDistance& d) { return std::vector{d.area_measured, d.area_modelled, d.area_between, d.frechet}; };
+    EXPECT_EQ(after.distances[0].kind, "force");
+    EXPECT_TRUE(same_bits(distance(after.distances[0]), distance(before.distances[0])));
+    ASSERT_EQ(after.models.size(), before.models.size());
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto figures = [](const ComparedModel& m) { return std::vector{m.misfit, m.aic, m.bic, m.weight}; };
+        EXPECT_EQ(after.models[i].name, before.models[i].name);
+        EXPECT_EQ(after.models[i].status, before.models[i].status);
+        EXPECT_TRUE(same_bits(figures(after.models[i]), figures(before.models[i])));
+        EXPECT_TRUE(same_bits(after.models[i].values, before.models[i].values));
+    }
     ASSERT_EQ(after.profile.size(), before.profile.size());
     ASSERT_EQ(after.posterior.size(), before.posterior.size());
     for (std::size_t i = 0; i < 2; ++i) {

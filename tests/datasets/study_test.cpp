@@ -144,6 +144,39 @@ TEST(UnitStudy, OverridesOfTheStudyAndOfItsScenes) {
     });
 }
 
+TEST(UnitStudy, MachinesAndFixedRatios) {
+    const StudyFolder folder;
+    const std::string offset = "\n[[parameters]]\nname = \"offset\"\nkey = \"experiments.wedge 1.displacement_offset\"\n"
+                               "initial = \"0 um\"\nlower = \"-20 um\"\nupper = \"0.02 mm\"\n";
+    std::string text = good_study + offset;
+    text.replace(text.find("weight = 2.0"), 12, "compliance = \"0.5 um/N\"\nforce_offset = \"-20 mN\"");
+    text.replace(text.find("initial = \"50 MPa\""), 0, "factors = [1, 12.5]\n");
+    const Study study = folder.read(text, {{"experiments.wedge 1.displacement_offset", "10 um"}});
+    const Machine& machine = study.experiments[0].machine;
+    EXPECT_DOUBLE_EQ(machine.compliance, 0.5e-6);
+    EXPECT_DOUBLE_EQ(machine.force_offset, -0.02);
+    EXPECT_DOUBLE_EQ(machine.displacement_offset, 10e-6);
+    EXPECT_EQ(study.experiments[1].machine.compliance, 0);
+    EXPECT_EQ(study.parameters[1].factor(0), 1);
+    EXPECT_EQ(study.parameters[1].factor(1), 12.5);
+    EXPECT_EQ(study.parameters[0].factor(0), 1);
+    EXPECT_EQ(study.parameters[3].unit, "um");
+    EXPECT_DOUBLE_EQ(study.parameters[3].lower, -20e-6);
+}
+
+TEST(UnitStudy, ModelsToCompare) {
+    const StudyFolder folder;
+    const Study study = folder.read(good_study + "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"30 MPa\", \"60 MPa\"]\n",
+                                    {{"materials.EW.density", "333 kg/m^3"}, {"optimizer.loss", "cauchy"}});
+    EXPECT_EQ(study.optimizer.loss, Loss::cauchy);
+    EXPECT_EQ(study.compared_key, "materials.EW.E");
+    ASSERT_EQ(study.models.size(), 2u);
+    EXPECT_EQ(study.models[1].name, "60 MPa");
+    ASSERT_EQ(study.models[1].scenes.size(), 2u);
+    EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").youngs_modulus, 60e6);
+    EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").density, 333);
+}
+
 TEST(UnitStudy, WhatIsWrongIsSaid) {
     const StudyFolder folder;
     struct Bad {
@@ -210,6 +243,23 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"title =", "outputs = [\"arrest length 0\"]\ntitle =", "outputs.0", "whole number from 1"},
         {"title =", "outputs = [\"peak force\", \"peak force\"]\ntitle =", "outputs.1", "asked for twice"},
         {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "either a scene or experiments"},
+        {"[optimizer]", "[optimizer]\nloss = \"huper\"", "optimizer.loss", "did you mean \"huber\"?"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\"]\n[optimizer]", "compare.values", "at least two"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 mm\"]\n[optimizer]", "compare.values.1", "wrong dimension"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 MPa\"]\n[optimizer]", "compare.values.1", "given twice"},
+        {"[optimizer]", "[compare]\nvalues = [\"1 MPa\", \"2 MPa\"]\n[optimizer]", "compare.key", "missing"},
+        {"weight = 2.0", "compliance = \"0.1 mm\"", "experiments.wedge 1.compliance", "wrong dimension"},
+        {"weight = 2.0", "compliance = \"-1 um/N\"", "experiments.wedge 1.compliance", "not be negative"},
+        {"weight = 2.0", "force_offset = 0.1", "experiments.wedge 1.force_offset", "missing unit"},
+        {"data = \"plain.csv\"", "data = \"plain.csv\"\ncompliance = \"1 um/N\"", "experiments.experiment 1.compliance", "no such column"},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.wedge 2.compliance\"", "parameters.2.key", "did you mean \"wedge 1\""},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.wedge 1.complianze\"", "parameters.2.key", "did you mean \"compliance\""},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.1.displacement_offset\"", "parameters.2.key", "no displacement column"},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.0\"", "parameters.2.key", "must be experiments.NAME"},
+        {"initial = \"50 MPa\"", "factors = [1]\ninitial = \"50 MPa\"", "parameters.stiffness.factors", "as many as the keys: 2, not 1"},
+        {"initial = \"50 MPa\"", "factors = [1, 0]\ninitial = \"50 MPa\"", "parameters.stiffness.factors.1", "must not be 0"},
+        {"initial = \"50 MPa\"", "factors = [1, -2]\ninitial = \"50 MPa\"", "parameters.stiffness.initial",
+         "times its factor, materials.LW.E must be greater than 0"},
         {"title =", "title = = ", "", "line 1"},
     };
     for (const Bad& bad : table) {

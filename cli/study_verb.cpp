@@ -1,0 +1,37 @@
+#include "cli/study_verb.hpp"
+
+#include "imaging/picture.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+namespace crampfit::cli {
+
+void add_study_arguments(CLI::App& verb, StudyArguments& arguments, const char* result) {
+    verb.add_option("study", arguments.study, "The study")->type_name("STUDY.toml")->required();
+    verb.add_option("-o,--output", arguments.output, "Where the result goes")->type_name(result)->required();
+    verb.add_flag("--resume", arguments.resume, "Go on from the runs that an earlier call has kept beside its output");
+}
+
+Study open_study(const std::filesystem::path& file, const CommonOptions& common) {
+    Study study = read_study(file, overrides_of(common));
+    if (study.scene)
+        load_specimen(*study.scene);
+    for (Experiment& experiment : study.experiments)
+        load_specimen(experiment.scene);
+    for (ModelChoice& model : study.models)
+        for (Scene& scene : model.scenes)
+            load_specimen(scene);
+    stop_on_signals();
+    spdlog::info("the study is read");
+    return study;
+}
+
+void RunsLine::show(int runs, int most, const std::string& failure, const std::string& details) {
+    if (!failure.empty())
+        report(common_, failure);
+    line_.show(std::min(1.0, static_cast<double>(runs) / std::max(1, most)), runs, details);
+}
+
+}  // namespace crampfit::cli

@@ -1,0 +1,99 @@
+#include "inverse/compare.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace crampfit {
+namespace {
+
+FitOptions options_of(const Study& study, std::size_t number, FitOptions options) {
+    if (!options.keeping.file.empty() && number > 0) {
+        options.keeping.file += fmt::format(".{}", number);
+    }
+    if (options.farm) {
+        options.farm->choose_model(static_cast<int>(number));
+    }
+    if (options.progress) {
+        options.progress = [tell = options.progress, name = study.models[number].name](FitProgress progress) {
+            progress.stage = name + ": " + progress.stage;
+            tell(progress);
+        };
+    }
+    return options;
+}
+
+ComparedModel compared(const std::string& model, const Fit& fit) {
+    ComparedModel row;
+    row.name = model;
+    row.status = name(fit.status);
+    row.misfit = fit.misfit;
+    for (const FittedParameter& parameter : fit.parameters) {
+        row.values.push_back(parameter.value);
+    }
+    return row;
+}
+
+// All models have the same data and parameters.
+void weigh(std::vector<ComparedModel>& models, double unexplained, std::size_t points) {
+    const auto k = static_cast<double>(models.front().values.size());
+    double least = std::numeric_limits<double>::infinity(), sum = 0;
+    for (ComparedModel& model : models) {
+        model.aic = model.misfit / unexplained + 2 * k;
+        model.bic = model.misfit / unexplained + k * std::log(static_cast<double>(std::max<std::size_t>(1, points)));
+        least = std::min(least, model.aic);
+    }
+    for (ComparedModel& model : models) {
+        model.weight = std::isfinite(model.aic) ? std::exp(-0.5 * (model.aic - least)) : 0.0;
+        sum += model.weight;
+    }
+    for (ComparedModel& model : models) {
+        model.weight /= std::max(sum, std::numeric_limits<double>::min());
+    }
+    std::stable_sort(models.begin(), models.end(), [](const auto& a, const auto& b) { return a.aic < b.aic; });
+}
+
+}  // namespace
+
+Study model_of(const Study& study, std::size_t model) {
+    Study one = study;
+    one.models.clear();
+    for (std::size_t i = 0; i < one.experiments.size(); ++i) {
+        one.experiments[i].scene = study.models[model].scenes[i];
+    }
+    one.scene_settings.emplace_back(study.compared_key, study.models[model].name);
+    return one;
+}
+
+Fit fit_models(const Study& study, const FitOptions& options) {
+    if (study.models.empty()) {
+        return fit_study(study, options);
+    }
+    Fit best;
+    std::vector<ComparedModel> models;
+    double unexplained = std::numeric_limits<double>::infinity(), seconds = 0;
+    bool interrupted = false;
+    for (std::size_t i = 0; i < study.models.size() && !interrupted; ++i) {
+        Fit fit = fit_study(model_of(study, i), options_of(study, i, options));
+        models.push_back(compared(study.models[i].name, fit));
+        unexplained = std::min(unexplained, fit.reduced_chi_square);
+        seconds += fit.seconds;
+        interrupted = fit.status == FitStatus::interrupted;
+        if (i == 0 || fit.misfit < best.misfit) {
+            best = std::move(fit);
+        }
+    }
+    weigh(models, std::max(1.0, unexplained), best.residuals.size());
+    if (models.size() > 1) {
+        best.message = fmt::format("{} \"{}\" explains the data best, with {:.2g} of the evidence; next \"{}\" with {:.2g}. {}",
+                                   study.compared_key, models[0].name, models[0].weight, models[1].name, models[1].weight, best.message);
+    }
+    best.models = std::move(models);
+    best.seconds = seconds;
+    best.status = interrupted ? FitStatus::interrupted : best.status;
+    return best;
+}
+
+}  // namespace crampfit
