@@ -366,9 +366,10 @@ Box CrackFields::window(const Vec2& from, const Vec2& to) const {
     return {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach};
 }
 
-std::array<int, 4> CrackFields::fields_at(const Vec2& x) const {
-    std::array<int, 4> fields = body_->layout.cell_nodes(body_->layout.cell_at(x));
-    for (int& field : fields) {
+std::array<int, most_nodes> CrackFields::fields_at(const Vec2& x) const {
+    std::array<int, most_nodes> fields = body_->layout.cell_nodes(body_->layout.cell_at(x));
+    for (int n = 0; n < body_->layout.nodes_per_cell(); ++n) {
+        int& field = fields[n];
         const int node = field;
         unsigned mask = 0;
         for (int k = 0; k < static_cast<int>(lines.size()); ++k)

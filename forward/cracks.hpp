@@ -91,8 +91,8 @@ class CrackFields {
     /// Where points change sides when a tip goes from one place to another.
     Box window(const Vec2& from, const Vec2& to) const;
 
-    /// The fields at the four nodes of x's cell that the material at x moves with.
-    std::array<int, 4> fields_at(const Vec2& x) const;
+    /// The fields at the nodes that x's cell sees with which the material at x moves: the first `nodes_per_cell()` of these.
+    std::array<int, most_nodes> fields_at(const Vec2& x) const;
 
     /// Displacement jump (left minus right) across a crack at a place on it, from the fields' displacements [m].
     Vec2 opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const;

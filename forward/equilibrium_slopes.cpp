@@ -168,31 +168,16 @@ double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& n
                                   const std::vector<Vec2>& displacement_slope) {
     constexpr double reach = 7.0;  // [cells] farther than the virtual extension
     Points& points = body_.points;
-    struct Wood {
-        int point;
-        std::array<double, 6> constants;
-        Eigen::Vector4d layers;
-    };
-    std::vector<Wood> here;
     const Vec2 tip = cracks_.lines[crack].tip(at_end).position;
-    body_.for_cells_near(tip, reach * body_.layout.cell.maxCoeff(), [&](int c) {
-        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-            Wood wood{p, {}, points.layers.empty() ? Eigen::Vector4d::Zero() : points.layers[p]};
-            for (int k = 0; k < 6; ++k) wood.constants[k] = points.stiffness[k][p];
-            here.push_back(wood);
-        }
-    });
-    const auto put = [&](int p, const std::array<double, 6>& constants, const Eigen::Vector4d& layers) {
-        for (int k = 0; k < 6; ++k) points.stiffness[k][p] = constants[k];
-        if (!points.layers.empty()) points.layers[p] = layers;
-    };
+    const auto stiffness = points.stiffness;
+    const auto layers = points.layers;
     const auto with_wood_of = [&](const MaterialMap& materials, double step) {
         body_.for_cells_near(tip, reach * body_.layout.cell.maxCoeff(), [&](int c) {
             const LocalWood wood = body_.wood_of_cell(materials, c);
             const Eigen::Matrix3d C = wood.elasticity.stiffness();
-            const std::array<double, 6> constants{C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
-            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p)
-                put(p, constants, wood.elasticity.coefficients.head<4>());
+            points.stiffness[c] = {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
+            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1] && !layers.empty(); ++p)
+                points.layers[p] = wood.elasticity.coefficients.head<4>();
         });
         std::vector<Vec2> displacement = displacement_;
         for (std::size_t f = 0; f < displacement.size(); ++f) displacement[f] += step * displacement_slope[f];
@@ -200,7 +185,8 @@ double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& n
     };
     const double more = with_wood_of(number.materials(true), number.step());
     const double less = with_wood_of(number.materials(false), -number.step());
-    for (const Wood& wood : here) put(wood.point, wood.constants, wood.layers);
+    points.stiffness = stiffness;
+    points.layers = layers;
     return (more - less) / (2.0 * number.step());
 }
 

@@ -18,11 +18,9 @@ ProbeReading read_probes(const std::vector<Vec2>& places, const Discretisation& 
         if (body.point_at(place) < 0) {
             moved.setConstant(std::numeric_limits<double>::quiet_NaN());
         } else {
-            // A point's domain never leaves its cell, where its averaged shape functions are the hats at its middle: hats, then.
-            const Vec2 corner = layout.cell_corner(layout.cell_at(place));
-            const CellWeights weights = cell_weights(ShapeFunction::linear, place - corner, layout.cell, {});
-            const std::array<int, 4> fields = cracks.fields_at(place);
-            for (int k = 0; k < 4; ++k) moved += weights.value[k] * displacement[fields[k]];
+            const auto weights = body.values_at(layout.cell_at(place), place);
+            const auto fields = cracks.fields_at(place);
+            for (int k = 0; k < layout.nodes_per_cell(); ++k) moved += weights[k] * displacement[fields[k]];
         }
         reading.moved.push_back(moved);
     }

@@ -109,7 +109,8 @@ void FieldComparison::move_with_camera(const std::vector<Point>& points, const s
         normal += weight * rows.transpose() * rows;
         right += weight * rows.transpose() * (points[i].measured - values[i]);
     }
-    const Eigen::Vector3d motion = normal.completeOrthogonalDecomposition().solve(right);
+    const Eigen::MatrixXd system = normal;  // of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end
+    const Eigen::VectorXd motion = system.completeOrthogonalDecomposition().solve(Eigen::VectorXd(right));
     for (std::size_t i = 0; i < points.size(); ++i) {
         values[i] += motion_at(places_[points[i].place] / reach_) * motion;
     }

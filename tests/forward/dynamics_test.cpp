@@ -150,13 +150,6 @@ TEST(UnitPlan, RefusesWhatItCannotDo) {
             s.solver.shape_function = ShapeFunction::bspline2;
         },
         "solver.shape_function");
-    const auto advances = [](Scene& s, Growth grows, SolverKind kind) {
-        s.cracks[0].grows = grows;
-        s.cracks[0].advance = 1e-4;
-        s.solver.kind = kind;
-        s.solver.damping = 0.0;
-    };
-    refused([&](Scene& s) { advances(s, Growth::both, SolverKind::quasistatic); }, "cracks.0.advance");
     refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
 }
 
