@@ -226,15 +226,29 @@ bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
     return false;
 }
 
+// Whether the straight way on from a tip that has come out of the wood meets wood again within a distance: the flanks of a notch lie
+// beside it, and it has to keep them apart.
+bool CrackFields::wood_lies_ahead(const CrackTip& tip, double distance) const {
+    const double cell = body_->layout.cell.minCoeff();
+    const Box specimen{Vec2::Zero(), body_->layout.size()};
+    for (double way = reach_of_an_end * cell; way < distance; way += 0.25 * cell) {
+        const Vec2 x = tip.position + way * tip.direction;
+        if ((x.array() < specimen.low.array()).any() || (x.array() > specimen.high.array()).any()) return false;
+        if (body_->point_at(x) >= 0) return true;
+    }
+    return false;
+}
+
 double CrackFields::freed(int crack, int node) const {
     const Vec2 x = body_->layout.node_position(node);
     const Box support = body_->layout.support(node);
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
         if (!exit_distance(tip->position, tip->direction, support)) continue;
-        if (!tip->inside) {  // at a hole or on another crack the cut ends
-            const Vec2 reach = reach_of_an_end * tip->direction.cwiseProduct(body_->layout.cell);
-            if ((x - tip->position).dot(tip->direction) > reach.norm()) return 0.0;
+        if (!tip->inside) {  // on another crack the cut ends, and where a hole does: what lies behind it is whole
+            const double ahead = (x - tip->position).dot(tip->direction);
+            const double reach = reach_of_an_end * tip->direction.cwiseProduct(body_->layout.cell).norm();
+            if (ahead > reach && (tip->wall >= 0 || wood_lies_ahead(*tip, ahead + reach))) return 0.0;
             continue;
         }
         least = std::min(least, share_freed(x, *tip, body_->layout));

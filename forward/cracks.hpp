@@ -105,6 +105,7 @@ class CrackFields {
     };
     std::optional<Meeting> meeting(int crack, const Vec2& from, const Vec2& to, double near) const;
     void end_at(CrackTip& tip, const Meeting& there);
+    bool wood_lies_ahead(const CrackTip& tip, double distance) const;
     bool beyond_wall(int crack, const Vec2& x) const;
     double freed(int crack, int node) const;
     bool is_inside(const Vec2& x) const;
