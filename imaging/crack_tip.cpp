@@ -23,7 +23,7 @@ constexpr int least_points = 60;  // four times the series' coefficients
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
-constexpr double most_torn = 0.8;      // share of the torn subsets that the crack must have torn
+constexpr double most_torn = 0.9;      // share of the torn subsets that the crack must have torn
 constexpr std::size_t least_torn = 8;  // of them that say anything
 
 // Of the search for the tip.
