@@ -1,11 +1,3 @@
-#include <cstddef>
-
-// libceres.a brings a copy of this function that was compiled for another alignment than ours, and the linker would take that one where
-// ours is not inlined: memory from the one must not be freed by the other.
-namespace Eigen::internal {
-__attribute__((always_inline)) inline void* aligned_malloc(std::size_t size);
-}
-
 #include "forward/tip_patch.hpp"
 
 #include "forward/deformation.hpp"
@@ -21,9 +13,7 @@ namespace crampfit {
 
 namespace {
 
-// Counted by long: libceres.a holds Eigen's sparse matrices counted by int, compiled for another alignment, and the linker would take
-// those.
-using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, std::ptrdiff_t>;
+using Sparse = Eigen::SparseMatrix<double>;
 
 // Half width of the patch: so many advances, and so many cells at least.
 constexpr double advances_in_reach = 8.0;
@@ -142,7 +132,7 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
         if (equation[2 * pair.left + j % 2] >= 0) apart(equation[2 * pair.left + j % 2], j) += 1.0;
         if (equation[2 * pair.right + j % 2] >= 0) apart(equation[2 * pair.right + j % 2], j) -= 1.0;
     }
-    const Eigen::SimplicialLLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<std::ptrdiff_t>> factor(K);
+    const Eigen::SimplicialLLT<Sparse> factor(K);
     const Eigen::MatrixXd moved = factor.solve(apart);
     flexibility_ = apart.transpose() * moved;
     by_held_ = -moved.transpose() * to_held;

@@ -53,7 +53,7 @@ template <class Work> auto interruptible(const Work& work) {
         const std::jthread worker([&] {
             try {
                 result = work(&stop);
-            } catch (...) {
+            } catch (...) {  // kept for Python's thread, which throws it again
                 thrown = std::current_exception();
             }
             done = true;

@@ -216,7 +216,7 @@ TEST(SystemReport, RefusesWhatItCannotReportAndNeverHarmsItsInput) {
 // The slider, which is hidden from who has no scripts, is shown by the script; the console stays empty.
 TEST(SystemReport, PageRunsInABrowserWithoutAWordOnTheConsole) {
     if (std::system("command -v chromium > /dev/null") != 0)
-        GTEST_SKIP() << "needs chromium";
+        GTEST_SKIP() << "needs chromium";  // a browser is no part of what scripts/setup installs
     Command command;
     command.folder.write("scene.toml", hostile_scene());
     ASSERT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5")}).status, 0);
