@@ -1,4 +1,5 @@
 // Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were alone.
+#include "forward/cracks.hpp"
 #include "forward/simulate.hpp"
 #include "tests/forward/cracked_plates.hpp"
 #include "tests/forward/hard_cases.hpp"
@@ -175,6 +176,28 @@ TEST(HardMeeting, ACrackThatEndsAtAHoleCutsNothingBehindIt) {
         whole.stop.displacement = 1e-5;
         // Wood behind the hole holds: a crack through it all would leave nothing.
         EXPECT_GT(touches, 0.2 * stiffness_at_the_end(simulate(whole)));
+    }
+}
+
+// Far above its root a sharp notch is still narrower than the cells that its flanks lie in.
+TEST(HardMeeting, ACrackFromANotchKeepsTheFlanksApart) {
+    for (const double middle : {5e-3, 5.03e-3}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.25e-3));
+        scene.specimen.cutouts = {Polygon{{Vec2(middle - 1.5e-3, 10e-3), Vec2(middle + 1.5e-3, 10e-3), Vec2(middle, 7e-3)}}};
+        Crack crack;
+        crack.points = {Vec2(middle, 7e-3), Vec2(middle, 5.9e-3)};
+        scene.cracks = {crack};
+        const MaterialMap materials(scene);
+        Discretisation body(scene, materials);
+        const CrackFields cracks(scene, body, materials, 0.02);
+        std::vector<std::array<int, 2>> points_on_side(cracks.fields(), {0, 0});
+        for (int p = 0; p < body.points.count(); ++p)
+            if (body.points.position[p].y() > 6.5e-3)
+                for (const int field : body.points.node[p]) ++points_on_side[field][body.points.position[p].x() > middle];
+        int joined = 0;
+        for (const auto& [left, right] : points_on_side) joined += left > 0 && right > 0;
+        std::printf("notch at %.2f mm: %d fields join its flanks\n", middle * 1e3, joined);
+        EXPECT_EQ(joined, 0);
     }
 }
 

@@ -85,7 +85,7 @@ std::vector<Values> kept(const std::filesystem::path& journal) {
     return runs;
 }
 
-// Killed 20 times at moments drawn at random, resumed each time, in the end left to finish.
+// Killed 20 times or more, until enough runs were kept, at moments drawn at random, resumed each time, in the end left to finish.
 TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
     const TemporaryFolder folder;
     Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
@@ -98,9 +98,9 @@ TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
     options.forward = slow_and_told(folder / "diary.txt", 4);
     options.keeping = {folder / "fit.runs", true};
     std::mt19937 generator(11);
-    int killed = 0;
+    int killed = 0, rounds = 0;
     std::map<Values, int> begun_when_kept;
-    for (int i = 0; i < 20; ++i) {
+    for (; rounds < 20 || (begun_when_kept.size() <= 20 && rounds < 100); ++rounds) {  // a busy machine keeps few in a round
         const pid_t child = ::fork();
         if (child == 0) {
             fit_study(study, options);
@@ -122,8 +122,8 @@ TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
     const auto times = begun(folder / "diary.txt");
     std::printf("%d kills, %zu runs, %zu kept before the last start\n", killed, times.size(), begun_when_kept.size());
     EXPECT_EQ(times.size(), whole.runs.size());
-    EXPECT_EQ(killed, 20);
-    EXPECT_GT(begun_when_kept.size(), 3u);
+    EXPECT_EQ(killed, rounds);
+    EXPECT_GT(begun_when_kept.size(), 20u);
     for (const auto& [run, count] : begun_when_kept) {
         EXPECT_EQ(times.at(run), count) << "run again though it was kept";
     }
