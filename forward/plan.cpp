@@ -45,15 +45,26 @@ bool starts_in_motion(const Scene& scene) {
     return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return !part.velocity.isZero(0.0); });
 }
 
+const char* name_of(VelocityUpdate update) {
+    switch (update) {
+        case VelocityUpdate::automatic: break;
+        case VelocityUpdate::flip: return "flip";
+        case VelocityUpdate::pic: return "pic";
+        case VelocityUpdate::xpic: return "xpic";
+        case VelocityUpdate::fmpm: return "fmpm";
+    }
+    return "auto";
+}
+
 void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     const std::string other = quasistatic ? "quasistatic" : "explicit";
     if (quasistatic && scene.solver.shape_function == ShapeFunction::bspline2)
         refuse(scene, "solver.shape_function", "bspline2",
                "not available at equilibrium; use \"auto\", \"gimp\", \"cpdi\" or \"linear\", or solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.velocity_update != VelocityUpdate::automatic)
-        refuse(scene, "solver.velocity_update", "given", "equilibrium has no velocities to update; leave it out");
+        refuse(scene, "solver.velocity_update", name_of(scene.solver.velocity_update), "equilibrium has no velocities to update; leave it out");
     if (quasistatic && scene.solver.stress_update != StressUpdate::last)
-        refuse(scene, "solver.stress_update", "given", "equilibrium has no time step; leave it out");
+        refuse(scene, "solver.stress_update", scene.solver.stress_update == StressUpdate::first ? "first" : "average", "equilibrium has no time step; leave it out");
     if (quasistatic && (starts_in_motion(scene) || scene.specimen.parts.size() > 1))
         refuse(scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
                "parts that start with a velocity or push on one another are for explicit dynamics; give solver.kind = \"explicit\"");

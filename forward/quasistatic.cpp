@@ -259,7 +259,7 @@ std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& befo
 // From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
 // nearest of these has gone between the two times.
 bool Quasistatic::solve_predicted(std::size_t number, int time) {
-    if (plan_.friction || plan_.free_bodies) return false;  // more than the displacement tells such a state
+    if (plan_.friction) return false;  // a state hangs on the way to it
     int before = places_[number].parent;
     for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back) before = back < farthest_back ? places_[before].parent : -1;
     if (before < 0) return false;
