@@ -40,9 +40,12 @@ class MaterialMap {
     void check_radial_direction() const;
     void check_transition(int first) const;
     Vec2 radial_direction(const Vec2& x) const;
-    void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, LayeredElasticity& mean) const;
+    Vec2 layer_normal(const Vec2& centre, const Vec2& half) const;
+    void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
+                            LayeredElasticity& mean) const;
     const LocalWood* band_around(const Vec2& centre, const Vec2& half) const;
     LocalWood in_rings(const Vec2& x) const;
+    std::size_t pixel_at(const Vec2& x) const;
     LocalWood in_picture(const Vec2& x) const;
 
     const Scene& scene_;
