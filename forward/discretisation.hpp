@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -77,6 +78,12 @@ class PointTable {
 /// How the wood differs between neighbouring points: not at all, by the direction of its grain alone, or in its constants.
 enum class Change : std::uint8_t { none, grain, wood };
 
+/// Points of a cell, counted along x and y from its lower left corner: from .. to - 1.
+struct PointBox {
+    int from_x, from_y, to_x, to_y;
+    auto operator<=>(const PointBox&) const = default;
+};
+
 /// Material points in the undeformed specimen, in cell order: those of cell c are first_of_cell[c] .. first_of_cell[c + 1]. What
 /// a cutout takes of a point's domain is taken off its volume.
 struct Points {
@@ -129,6 +136,11 @@ class Discretisation {
     std::vector<CellWeights> weights;  // by slot: places in a cell row by row and, for B-splines, for each kind of cell (`cell_ends`)
     std::vector<CellWeights> corner_weights;  // linear, by place in a cell: of what is given at the cells' corners
     std::vector<Facet> facets;
+    struct UnevenCell {
+        int cell;
+        Unevenness wood;
+    };
+    std::vector<UnevenCell> uneven_cells;  // full cells of more than one wood, in order; none with B-splines
 
     Box domain(int p) const {  // of a point, whatever cutouts take of it
         const int place = place_of(p);
@@ -142,6 +154,7 @@ class Discretisation {
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     int point_at(const Vec2& x) const;                 // the point whose domain holds x, or -1
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;  // on average
+    Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box) const;  // of a piece of a full cell
     int neighbour(int p, int step_x, int step_y) const;  // the point that many places away, or -1
 
     /// Calls `visit(c)` for every cell that a square of half width `reach` about x touches.

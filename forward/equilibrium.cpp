@@ -40,7 +40,7 @@ constexpr double least_strain = 1e-5;
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, plan.rotates),
+      boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, materials, plan.rotates),
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
@@ -233,7 +233,7 @@ void Equilibrium::add_pairs() {
 
 void Equilibrium::add_lone_points() {
     for (const InternalForce::Alone& alone : internal_force_.alone()) {
-        const auto& sign = InternalForce::crosswise_sign;
+        const auto& sign = crosswise_sign;
         Eigen::Matrix<double, 8, 8> tangent;
         for (int a = 0; a < 4; ++a)
             for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();

@@ -111,13 +111,21 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
             for (int k = 0; k < 4; ++k) add(n, points.node[p][k], rates.middleCols<2>(2 * k).transpose() * stress);
         }
     }
+    for (const UnevenCells::Piece& piece : internal_force_.uneven().pieces()) {
+        for (std::size_t n = 0; n < numbers.size(); ++n) {
+            if (numbers[n].stiffness(piece.cell).isZero(0.0)) continue;
+            const UnevenCells::State state = internal_force_.uneven().state(piece, numbers[n].unevenness(piece.cell, piece.box), displacement_);
+            slope.potential[n] += state.energy;
+            for (int k = 0; k < 4; ++k) add(n, points.node[piece.point][k], state.force.segment<2>(2 * k));
+        }
+    }
     for (const InternalForce::Alone& alone : internal_force_.alone()) {
         const Vec2 cross = internal_force_.crosswise(alone.point, displacement_);
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             const Eigen::Matrix3d& C = numbers[n].stiffness(points.cell[alone.point]);
             const Vec2 pull = internal_force_.crosswise_stiffness(alone.point, C) * cross;
             slope.potential[n] += 0.5 * pull.dot(cross);
-            for (int k = 0; k < 4; ++k) add(n, points.node[alone.point][k], InternalForce::crosswise_sign[k] * pull);
+            for (int k = 0; k < 4; ++k) add(n, points.node[alone.point][k], crosswise_sign[k] * pull);
         }
     }
     // Ties and closed faces are as stiff as their wood.

@@ -18,7 +18,7 @@ constexpr double least_freed = -0.02;
 
 ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), internal_force_(body, plan.rotates), team_(threads),
+      boundary_(scene, body, cracks_), internal_force_(body, materials, plan.rotates), team_(threads),
       ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());

@@ -6,7 +6,8 @@
 
 namespace crampfit {
 
-InternalForce::InternalForce(const Discretisation& body, bool rotates) : body_(body), rotates_(rotates), strips_(body.layout) {
+InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates)
+    : body_(body), rotates_(rotates), uneven_(body, materials, rotates), strips_(body.layout) {
     sort_cells();
 }
 
@@ -17,6 +18,7 @@ void InternalForce::sort_cells() {
     loose_points_.clear();
     alone_.clear();
     first_of_strip_.clear();
+    uneven_.sort();
     for (int c = 0; c < layout.cells(); ++c) {
         if (c == strips_.first_cell(static_cast<int>(first_of_strip_.size())))
             first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
@@ -187,13 +189,21 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
 }
 
 Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
+    Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
+    const int cell = body_.points.cell[first];
+    for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1))
+        if (piece.point >= first && piece.point < first + count) sum += uneven_.tangent(piece, displacement, geometric);
+    return sum;
+}
+
+Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
     switch (count) {
         case 1: return tangent_of<1>(first, displacement, geometric);
         case 4: return tangent_of<4>(first, displacement, geometric);
         case 9: return tangent_of<9>(first, displacement, geometric);
         case 16: return tangent_of<16>(first, displacement, geometric);
         case 25: return tangent_of<25>(first, displacement, geometric);
-        default: return tangent(first, 1, displacement, geometric) + tangent(first + 1, count - 1, displacement, geometric);
+        default: return elastic_tangent_of(first, 1, displacement, geometric) + elastic_tangent_of(first + 1, count - 1, displacement, geometric);
     }
 }
 
@@ -212,6 +222,11 @@ double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, st
         const auto node = points.node[p];
         for (std::size_t k = 0; k < node.size(); ++k)
             (*force)[node[k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
+    }
+    for (const UnevenCells::Piece& piece : uneven_.pieces(strips_.first_cell(strip), strips_.first_cell(strip + 1))) {
+        const UnevenCells::State state = uneven_.state(piece, *piece.wood, displacement);
+        energy += state.energy;
+        for (int k = 0; k < 4 && force; ++k) (*force)[points.node[piece.point][k]] -= state.force.segment<2>(2 * k);
     }
     for (std::size_t i = from.alone; i < to.alone; ++i) {
         const Alone& a = alone_[i];

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/strips.hpp"
+#include "forward/uneven_cells.hpp"
 
 #include <array>
 #include <vector>
@@ -8,7 +9,7 @@
 namespace crampfit {
 
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
-/// displacements. Cells that hold all their points on common fields are taken a cell at a time, side by side; the others,
+/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side by side; the others,
 /// next to a crack or a cutout, point by point.
 ///
 /// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
@@ -19,9 +20,7 @@ namespace crampfit {
 /// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
   public:
-    static constexpr std::array<double, 4> crosswise_sign{1.0, -1.0, -1.0, 1.0};  // of a cell's nodes
-
-    InternalForce(const Discretisation& body, bool rotates);
+    InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates);
 
     /// Call after points changed their fields.
     void sort_cells();
@@ -43,6 +42,8 @@ class InternalForce {
     double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
     Vec2 crosswise(int point, const std::vector<Vec2>& displacement) const;  // u_0 - u_1 - u_2 + u_3 [m]
 
+    const UnevenCells& uneven() const { return uneven_; }
+
     /// Strain energy of all points [J].
     double energy(const std::vector<Vec2>& displacement) const;
 
@@ -58,6 +59,7 @@ class InternalForce {
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     template <int Nodes, int PointsPerCell, bool Rotates>
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
@@ -66,6 +68,7 @@ class InternalForce {
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
     std::vector<Alone> alone_;
+    UnevenCells uneven_;
     Strips strips_;
     std::vector<Place> first_of_strip_;  // [strips + 1]
 };

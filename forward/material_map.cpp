@@ -5,6 +5,7 @@
 
 #include "datasets/error.hpp"
 
+#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -212,12 +213,15 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
     return first_axis(tensor);
 }
 
+// Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
+int MaterialMap::samples_in(const Vec2& half) const {
+    return std::clamp(finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16, 2, 16);
+}
+
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (homogeneous_) return pure_[0];
     if (const LocalWood* wood = band_around(centre, half)) return *wood;
-    // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
-    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
-    const int samples = std::clamp(fit, 2, 16);
+    const int samples = samples_in(half);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
     double least = 1.0, most = 0.0;                 // latewood: layers lie as it does, whatever the moduli
@@ -250,6 +254,69 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     sum.latewood *= share;
     sum.filled /= static_cast<double>(samples) * samples;
     return sum;
+}
+
+Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
+    const LocalWood* band = band_around(centre, half);
+    if (homogeneous_ || average.filled < 1.0 || (band && band->elasticity.coefficients == average.elasticity.coefficients)) return {};
+    using Coefficients = LayeredElasticity::Coefficients;
+    const int samples = samples_in(half);
+    const Vec2 normal = average.elasticity.normal;
+    std::vector<Coefficients> wood;
+    for (int k = 0; k < samples * samples; ++k) {
+        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const LocalWood here = at(centre + place.cwiseProduct(half));
+        wood.push_back(orthotropic_ ? layered(here.elasticity.stiffness(), normal).coefficients : here.elasticity.coefficients);
+    }
+    const Coefficients of_average = average.elasticity.coefficients;
+    const double no_other_wood = orthotropic_ ? 0.01 : 1e-12;  // grain that turns within the cell is none
+    const auto is_average = [&](const Coefficients& c) {
+        const Coefficients d = c - of_average;
+        return std::max({std::abs(d[0]) / of_average[0], std::abs(d[2]) / of_average[2], std::abs(d[3]) / of_average[3], std::abs(d[1])}) < no_other_wood;
+    };
+    if (std::all_of(wood.begin(), wood.end(), is_average)) return {};
+    Coefficients mean = Coefficients::Zero();
+    for (const Coefficients& c : wood) mean += c / static_cast<double>(wood.size());
+    // All in the axes n, s of the layers: strain is counted nn, ss, 2 ns. From e_nn = a s_nn + c s_ns - r e_ss, e_ns alike, the strain
+    // jumps with a s_nn, b s_ns, r e_ss and so on: three amplitudes.
+    Eigen::Matrix3d turn;  // of strain, from x, y
+    const double nx = normal.x(), ny = normal.y();
+    turn << nx * nx, ny * ny, nx * ny, ny * ny, nx * nx, -nx * ny, -2.0 * nx * ny, 2.0 * nx * ny, nx * nx - ny * ny;
+    const Eigen::Matrix3d average_stiffness = LayeredElasticity{of_average, Vec2::UnitX()}.stiffness();
+    Eigen::Matrix3d jump_jump = Eigen::Matrix3d::Zero(), jump_mean = Eigen::Matrix3d::Zero();
+    Eigen::Matrix<double, 3, 2> jump_bend = Eigen::Matrix<double, 3, 2>::Zero();
+    Unevenness found;
+    for (int k = 0; k < samples * samples; ++k) {
+        const double x = spread.x() * half.x() * ((2.0 * (k % samples) + 1.0) / samples - 1.0);
+        const double y = spread.y() * half.y() * ((2.0 * (k / samples) + 1.0) / samples - 1.0);
+        Eigen::Matrix<double, 3, 2> bend;  // strain of q
+        bend << y, 0, 0, x, x, y;
+        bend = turn * bend;
+        const Eigen::Matrix3d C = LayeredElasticity{wood[k], Vec2::UnitX()}.stiffness();
+        const Coefficients d = wood[k] - mean;
+        Eigen::Matrix3d jump;
+        jump << d[2] / mean[2], d[5] / mean[3], d[1], 0, 0, 0, d[5] / mean[2], d[3] / mean[3], d[4];
+        jump_jump += jump.transpose() * C * jump;
+        jump_mean += jump.transpose() * C;
+        jump_bend += jump.transpose() * C * bend;
+        found.coupling += C * bend;
+        found.bending += bend.transpose() * (C - average_stiffness) * bend;
+    }
+    // Two woods jump in proportion, whatever the amplitude: of these the smallest will do.
+    const Eigen::Vector3d diagonal = jump_jump.diagonal().cwiseSqrt();
+    const double negligible = 1e-10 * std::max(diagonal.maxCoeff(), std::sqrt(of_average[0]));
+    const Eigen::Vector3d scale = (diagonal.array() > negligible).select(1.0 / diagonal.array(), 0.0);
+    const Eigen::Matrix3d scaled = scale.asDiagonal() * jump_jump * scale.asDiagonal();
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+    solver.setThreshold(1e-9);
+    solver.compute(Eigen::MatrixXd(scaled));
+    const Eigen::Matrix<double, 3, 2> amplitude = scale.asDiagonal() * solver.solve(Eigen::MatrixXd(scale.asDiagonal() * jump_bend));
+    const double share = 1.0 / (samples * samples);
+    found.coupling = share * turn.transpose() * (found.coupling - jump_mean.transpose() * amplitude);
+    found.bending = share * (found.bending - jump_bend.transpose() * amplitude);
+    const Eigen::Matrix3d more = LayeredElasticity{mean, Vec2::UnitX()}.stiffness() - average_stiffness;
+    if (more.norm() > 1e-12 * average_stiffness.norm()) found.stretch = turn.transpose() * more * turn;
+    return found;
 }
 
 // Samples of a square lattice whose own layers need not run the same way; void has none. `normal` is across layers of different wood.

@@ -17,6 +17,17 @@ struct LocalWood {
     double plane_modulus() const { return elasticity.coefficients[0]; }
 };
 
+/// What a part of an area adds to the area's average stiffness, as energy per area of the part. With q (y - y_0) and q (x - x_0) the
+/// displacement gradients in x and y by which those in the part's middle change, and e the strain there (xx, yy, 2 xy), it is
+/// e . stretch e / 2 + e . coupling q + q . bending q / 2.
+struct Unevenness {
+    Eigen::Matrix3d stretch = Eigen::Matrix3d::Zero();                           // [Pa]; 0 for the whole area
+    Eigen::Matrix<double, 3, 2> coupling = Eigen::Matrix<double, 3, 2>::Zero();  // [Pa m]
+    Eigen::Matrix2d bending = Eigen::Matrix2d::Zero();                           // [Pa m^2]
+
+    bool isZero() const { return stretch.isZero(0.0) && coupling.isZero(0.0) && bending.isZero(0.0); }
+};
+
 /// The scene's wood by place: one material, analytic rings, or a picture. Cutouts are not its business.
 /// Between EW and LW the density goes linearly and the other constants follow it (`transition_wood`). Orthotropic wood stands as
 /// layers across its radial direction.
@@ -32,6 +43,12 @@ class MaterialMap {
     /// area.
     LocalWood average(const Vec2& centre, const Vec2& half) const;
 
+    /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Strain adds to what the displacements
+    /// say a part that jumps between the layers as a laminate's does, has no mean, and makes the energy least (enhanced assumed
+    /// strain, Simo and Rifai 1990). Places count with their distance from the middle times `spread`, so that the points which
+    /// integrate the average have the same second moment.
+    Unevenness unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
+
     bool homogeneous() const { return homogeneous_; }
     bool orthotropic() const { return orthotropic_; }  // some of it
 
@@ -40,6 +57,7 @@ class MaterialMap {
     void check_radial_direction() const;
     void check_transition(int first) const;
     Vec2 radial_direction(const Vec2& x) const;
+    int samples_in(const Vec2& half) const;
     Vec2 layer_normal(const Vec2& centre, const Vec2& half) const;
     void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                             LayeredElasticity& mean) const;

@@ -26,7 +26,7 @@ struct MaterialSlope::Shifted {
         : scene(with_number(original, key, value)), materials(scene) {}
 };
 
-MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body) {
+MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body) : body_(&body) {
     const double value = get_number(scene, key);
     step_ = relative_step * (value != 0.0 ? std::abs(value) : 1.0);
     more_ = std::make_shared<Shifted>(scene, key, value + step_);
@@ -37,6 +37,15 @@ MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const D
         const auto of = [&](const Shifted& s) { return body.wood_of_cell(s.materials, c).elasticity.stiffness(); };
         stiffness_[c] = (of(*more_) - of(*less_)) / (2.0 * step_);
     }
+}
+
+const Unevenness& MaterialSlope::unevenness(int cell, const PointBox& box) const {
+    const auto known = unevenness_.find({cell, box});
+    if (known != unevenness_.end()) return known->second;
+    const Unevenness more = body_->unevenness_of(more_->materials, cell, box), less = body_->unevenness_of(less_->materials, cell, box);
+    const double span = 2.0 * step_;
+    return unevenness_[{cell, box}] = {(more.stretch - less.stretch) / span, (more.coupling - less.coupling) / span,
+                                       (more.bending - less.bending) / span};
 }
 
 const MaterialMap& MaterialSlope::materials(bool more) const { return (more ? more_ : less_)->materials; }

@@ -2,6 +2,7 @@
 
 #include "forward/discretisation.hpp"
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,11 +14,14 @@ namespace crampfit {
 /// 1e-5 of the number. Their error is of the order of 1e-10.
 class MaterialSlope {
   public:
-    /// Throws InputError where the scene has no such number.
+    /// Throws InputError where the scene has no such number. `body` must outlive this.
     MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body);
 
     /// Stiffness of a cell's points [Pa / the number's unit].
     const Eigen::Matrix3d& stiffness(int cell) const { return stiffness_[cell]; }
+
+    /// Of a piece of an uneven cell.
+    const Unevenness& unevenness(int cell, const PointBox& box) const;
 
     /// The map with the number more or less by `step`.
     const MaterialMap& materials(bool more) const;
@@ -31,6 +35,8 @@ class MaterialSlope {
     double step_;
     std::shared_ptr<const Shifted> more_, less_;
     std::vector<Eigen::Matrix3d> stiffness_;  // [cells]
+    const Discretisation* body_;
+    mutable std::map<std::pair<int, PointBox>, Unevenness> unevenness_;  // as they were asked for
 };
 
 } // namespace crampfit

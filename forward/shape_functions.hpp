@@ -32,6 +32,9 @@ std::array<Weight, 3> spline_weights(double place, double h, CellEnds ends);
 /// Most nodes that a cell sees: 3 x 3 with quadratic B-splines; 2 x 2 with all others.
 constexpr int most_nodes = 9;
 
+/// Of a cell's corners: the displacement u_0 - u_1 - u_2 + u_3 is how far the gradient changes across the cell.
+inline constexpr std::array<double, 4> crosswise_sign{1.0, -1.0, -1.0, 1.0};
+
 /// Shape functions of the nodes that a cell sees, row by row from the lower left one, at one place in the cell.
 struct CellWeights {
     std::array<double, most_nodes> value{};

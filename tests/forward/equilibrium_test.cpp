@@ -111,40 +111,96 @@ TEST(UnitElasticity, WithoutItsGeometricPartTheTangentIsNeverNegative) {
         1e-13 * C.norm());
 }
 
-TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
-    // Cells far from a crack go side by side, cells next to it point by point: both must agree with one energy. The step is 1e-6
-    // of a cell: truncation 1e-12, rounding 1e-9 of the force.
-    Scene scene = block({6e-3, 6e-3}, 1e-3);
+// A cracked block of earlywood, or of rings whose boundaries cross many cells.
+Scene cracked_block(bool rings) {
+    Scene scene = rings ? ring_specimen(3e-3, 1e-3) : block({6e-3, 6e-3}, 1e-3);
+    if (rings) scene.specimen.rings->pith = {-6e-3, -3e-3};
     Crack crack;
     crack.points = {Vec2(0, 3.3e-3), Vec2(2.6e-3, 3.1e-3)};
     scene.cracks = {crack};
+    return scene;
+}
+
+std::vector<Vec2> random_displacement(int fields) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> in(-0.2e-3, 0.2e-3);
+    std::vector<Vec2> displacement(fields);
+    for (Vec2& u : displacement) u = Vec2(in(random), in(random));
+    return displacement;
+}
+
+TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
+    // Cells far from a crack go side by side, cells next to it point by point, and what uneven cells add: all must agree with one
+    // energy. The step is 1e-6 of a cell: truncation 1e-12, rounding 1e-9 of the force.
+    for (const bool rings : {false, true}) {
+        const Scene scene = cracked_block(rings);
+        const MaterialMap materials(scene);
+        Discretisation body(scene, materials);
+        const CrackFields cracks(scene, body, materials, 1e-3);
+        ASSERT_GT(cracks.fields(), body.layout.nodes());
+        const std::vector<Vec2> displacement = random_displacement(cracks.fields());
+        for (const bool rotates : {false, true}) {
+            const InternalForce internal(body, materials, rotates);
+            ASSERT_EQ(internal.uneven().pieces().empty(), !rings);
+            std::vector<Vec2> force(cracks.fields(), Vec2::Zero());
+            internal.add(displacement, force);
+            double largest = 0, worst = 0;
+            for (const Vec2& f : force) largest = std::max(largest, f.norm());
+            for (int f = 0; f < cracks.fields(); ++f) {
+                for (int axis = 0; axis < 2; ++axis) {
+                    std::vector<Vec2> more = displacement, less = displacement;
+                    more[f][axis] += 1e-9;
+                    less[f][axis] -= 1e-9;
+                    const double slope = (internal.energy(more) - internal.energy(less)) / 2e-9;
+                    worst = std::max(worst, std::abs(slope + force[f][axis]));
+                }
+            }
+            std::printf("internal force, %s, %s: off by %.1e of the largest\n", rings ? "rings" : "one wood",
+                        rotates ? "finite rotation" : "small strain", worst / largest);
+            EXPECT_LT(worst, 1e-7 * largest);
+        }
+    }
+}
+
+TEST(UnitInternalForce, UnevenCellsHaveTheTangentOfTheirForce) {
+    const Scene scene = cracked_block(true);
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
     const CrackFields cracks(scene, body, materials, 1e-3);
-    ASSERT_GT(cracks.fields(), body.layout.nodes());
-    std::mt19937 random(4);
-    std::uniform_real_distribution<double> in(-0.2e-3, 0.2e-3);
-    std::vector<Vec2> displacement(cracks.fields());
-    for (Vec2& u : displacement) u = Vec2(in(random), in(random));
+    const std::vector<Vec2> displacement = random_displacement(cracks.fields());
     for (const bool rotates : {false, true}) {
-        const InternalForce internal(body, rotates);
-        std::vector<Vec2> force(cracks.fields(), Vec2::Zero());
-        internal.add(displacement, force);
-        double largest = 0, worst = 0;
-        for (const Vec2& f : force) largest = std::max(largest, f.norm());
-        for (int f = 0; f < cracks.fields(); ++f) {
-            for (int axis = 0; axis < 2; ++axis) {
+        const InternalForce internal(body, materials, rotates);
+        double worst = 0;
+        const UnevenCells& uneven = internal.uneven();
+        ASSERT_GT(uneven.pieces().size(), body.uneven_cells.size()) << "the crack cuts none";
+        for (const UnevenCells::Piece& piece : uneven.pieces()) {
+            const auto node = body.points.node[piece.point];
+            Eigen::Matrix<double, 8, 8> slope;
+            for (int i = 0; i < 8; ++i) {
                 std::vector<Vec2> more = displacement, less = displacement;
-                more[f][axis] += 1e-9;
-                less[f][axis] -= 1e-9;
-                const double slope = (internal.energy(more) - internal.energy(less)) / 2e-9;
-                worst = std::max(worst, std::abs(slope + force[f][axis]));
+                more[node[i / 2]][i % 2] += 1e-9;
+                less[node[i / 2]][i % 2] -= 1e-9;
+                slope.col(i) = (uneven.state(piece, *piece.wood, more).force - uneven.state(piece, *piece.wood, less).force) / 2e-9;
             }
+            worst = std::max(worst, (uneven.tangent(piece, displacement, true) - slope).norm() / std::max(slope.norm(), 1e3));
         }
-        std::printf("internal force, %s: off by %.1e of the largest\n", rotates ? "finite rotation" : "small strain",
-                    worst / largest);
-        EXPECT_LT(worst, 1e-7 * largest);
+        std::printf("tangent of uneven cells, %s: off by %.1e\n", rotates ? "finite rotation" : "small strain", worst);
+        EXPECT_LT(worst, 1e-6);
     }
+}
+
+TEST(UnitInternalForce, UnevenCellsFeelNoRotation) {
+    const Scene scene = cracked_block(true);
+    const MaterialMap materials(scene);
+    const Discretisation body(scene, materials);
+    const InternalForce internal(body, materials, true);
+    std::vector<Vec2> displacement = random_displacement(body.layout.nodes());
+    const double energy = internal.energy(displacement);
+    for (int n = 0; n < body.layout.nodes(); ++n) {
+        const Vec2 x = body.layout.node_position(n);
+        displacement[n] = turn(1.2) * (x + displacement[n]) - x;
+    }
+    EXPECT_NEAR(internal.energy(displacement), energy, 1e-10 * energy);
 }
 
 // A grid whose nodes have so many equations each, every cell with a random element that is positive definite.

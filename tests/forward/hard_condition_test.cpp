@@ -33,10 +33,10 @@ Matrix stiffness(const AtRest& run) {
         for (int a = 0; a < 8; ++a)
             for (int b = 0; b < 8; ++b) add(2 * points.node[p][a / 2] + a % 2, 2 * points.node[p][b / 2] + b % 2, K(a, b));
     }
-    const InternalForce internal(run.body, false);
+    const InternalForce internal(run.body, run.materials, false);
     for (const auto& alone : internal.alone()) {
         const auto node = points.node[alone.point];
-        const auto& sign = InternalForce::crosswise_sign;
+        const auto& sign = crosswise_sign;
         for (int axis = 0; axis < 2; ++axis)
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) add(2 * node[a] + axis, 2 * node[b] + axis, alone.stiffness * sign[a] * sign[b]);

@@ -171,5 +171,64 @@ TEST(UnitLayout, FitsTheSpecimenAndLeavesOutCutouts) {
     EXPECT_NEAR(outline, 2 * M_PI * 1e-3, 0.3e-3);
 }
 
+// A picture of 1 mm x 1 mm in two woods without Poisson's effect, latewood where `is_late` says so.
+template <class IsLate>
+Scene two_woods(int pixels, const IsLate& is_late) {
+    Scene scene = block({1e-3, 1e-3}, 0.1e-3);
+    scene.model.plane = PlaneCondition::stress;
+    scene.materials["EW"].poisson_ratio = 0.0;
+    scene.materials["LW"] = {1200e6, 0.0, 900.0, 100.0};
+    Specimen map;
+    map.columns = map.rows = pixels;
+    map.pixel = 1e-3 / pixels;
+    map.classes = {"EW", "LW"};
+    for (int row = 0; row < pixels; ++row)
+        for (int column = 0; column < pixels; ++column)
+            map.label.push_back(is_late(map.pixel * Vec2(column + 0.5, pixels - row - 0.5)));
+    scene.specimen.map = std::make_shared<Specimen>(map);
+    scene.specimen.material.clear();
+    return scene;
+}
+
+TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
+    double worst = 0;
+    for (double degrees = 0; degrees < 90; degrees += 2.5) {
+        const double angle = degrees * M_PI / 180;
+        const Vec2 normal(std::cos(angle), std::sin(angle));
+        const Scene scene = two_woods(80, [&](const Vec2& x) { return normal.dot(x - Vec2(0.5e-3, 0.5e-3)) > 0.0; });
+        const MaterialMap materials(scene);
+        const Vec2 found = materials.average(Vec2(0.51e-3, 0.49e-3), Vec2(0.05e-3, 0.05e-3)).elasticity.normal;
+        worst = std::max(worst, std::asin(std::abs(cross(normal, found))) * 180 / M_PI);
+    }
+    std::printf("normal of an edge in a picture, cells of 8 pixels: within %.2f degrees\n", worst);
+    EXPECT_LT(worst, 1.0);
+}
+
+TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
+    // Two halves side by side, h wide and high, by hand: stretch along the boundary feels the first moment of E; shear across it is as
+    // in a laminate, gamma + q x + alpha (1/G - mean of 1/G) with the alpha of least energy.
+    const double h = 1e-3, spread = 0.9, E1 = 40e6, E2 = 1200e6, G1 = E1 / 2, G2 = E2 / 2;
+    const Scene scene = two_woods(8, [&](const Vec2& x) { return x.x() > 0.5 * h; });
+    const MaterialMap materials(scene);
+    const Vec2 middle(0.5 * h, 0.5 * h);
+    const LocalWood average = materials.average(middle, middle);
+    const Unevenness wood = materials.unevenness(middle, middle, average, {spread, spread});
+    const double E = (E1 + E2) / 2, G = (G1 + G2) / 2, mean_1_E = (1 / E1 + 1 / E2) / 2, m = (1 / G1 + 1 / G2) / 2;
+    const double first = (G2 - G1) * spread * h / 8;                          // mean of G x
+    const double second = spread * spread * h * h / 12 * (1 - 1 / 256.0);    // mean of x^2, by 16 samples
+    Eigen::Matrix<double, 3, 2> coupling = Eigen::Matrix<double, 3, 2>::Zero();
+    coupling(1, 1) = (E2 - E1) * spread * h / 8;
+    Eigen::Matrix2d bending;
+    bending << (E - 1 / mean_1_E + G - 1 / m) * second - m * first * first / (m * G - 1), 0, 0, (G - 1 / m) * second;
+    EXPECT_LT((wood.coupling - coupling).norm(), 1e-9 * coupling.norm());
+    EXPECT_LT((wood.bending - bending).norm(), 1e-9 * bending.norm());
+    EXPECT_TRUE(wood.stretch.isZero(0.0));
+    // Of the cell's left half: what earlywood is short of the average.
+    const Unevenness left = materials.unevenness({0.25 * h, 0.5 * h}, {0.25 * h, 0.5 * h}, average, {0.0, 0.0});
+    const Eigen::Matrix3d early = plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
+    EXPECT_LT((left.stretch - early).norm(), 1e-12 * early.norm());
+    EXPECT_TRUE(left.coupling.isZero(1e-12 * coupling.norm()) && left.bending.isZero(0.0));
+}
+
 }  // namespace
 }  // namespace crampfit::test

@@ -1,0 +1,55 @@
+#pragma once
+
+#include "forward/deformation.hpp"
+
+#include <map>
+#include <span>
+#include <vector>
+
+namespace crampfit {
+
+/// What the wood of a cell with more than one adds to the energy of its points, which all have the cell's average stiffness, for where
+/// in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields. Most cells are one piece; a
+/// crack cuts them in several, each with its own wood. With F the gradient in a piece's middle, R its turn, c = u_0 - u_1 - u_2 + u_3 of
+/// the cell's nodes, d = R^T c and e Biot's strain (without `rotates` the small strain and R = 1) its energy is
+/// e . S e / 2 + e . G d + d . H d / 2.
+class UnevenCells {
+  public:
+    /// `body` and `materials` must outlive this.
+    UnevenCells(const Discretisation& body, const MaterialMap& materials, bool rotates);
+
+    /// Call after points changed their fields.
+    void sort();
+
+    struct Piece {
+        int cell;
+        int point;              // its first, which knows the fields
+        PointBox box;
+        const Unevenness* wood;
+    };
+    /// Those of cells `first` .. `last` - 1.
+    std::span<const Piece> pieces(int first, int last) const;
+    std::span<const Piece> pieces() const { return pieces_; }
+
+    struct State {
+        double energy;                        // [J]
+        Eigen::Matrix<double, 8, 1> force;    // slope of the energy by the displacements of the piece's fields [N]
+    };
+    State state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
+
+    /// Slope of that force [N/m]; `geometric` as in `elastic_tangent`.
+    Eigen::Matrix<double, 8, 8> tangent(const Piece& piece, const std::vector<Vec2>& displacement, bool geometric) const;
+
+  private:
+    struct Local;
+    Local local(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
+    const Unevenness& wood_of(const Discretisation::UnevenCell& cell, const PointBox& box);
+
+    const Discretisation& body_;
+    const MaterialMap& materials_;
+    bool rotates_;
+    std::vector<Piece> pieces_;                           // by cell
+    std::map<std::pair<int, PointBox>, Unevenness> cut_;  // of pieces of cells, as they were met
+};
+
+} // namespace crampfit
