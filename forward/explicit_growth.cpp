@@ -56,15 +56,13 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (way < least_way_in_cells * cell) return;
 
     Vec2 direction = tip.direction;
-    state.leg_opening += way * state.opening;
     if (state.since_turn >= leg_in_cells * cell) {
         TipLoad load = load_at(crack, at_end);
         const double newest = std::isfinite(state.since_turn) ? leg_in_cells : 1.0;  // a mean over a cell or so
         state.intensities += newest * (Vec2(load.K_I, load.K_II) - state.intensities);
         load.K_I = state.intensities[0];
         load.K_II = state.intensities[1];
-        load.opening = state.leg_opening;
-        state.leg_opening.setZero();
+        load.opening = state.opening;
         direction = growth_direction(scene_.cracks[crack].direction, tip, load, materials_, leg_in_cells * cell);
         state.since_turn = 0.0;
     }
