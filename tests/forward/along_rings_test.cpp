@@ -43,8 +43,7 @@ struct AlongRings {
 };
 
 TEST(VerificationAlongRings, ACrackInEarlywoodIsTurnedOffLatewood) {
-    // No way in earlywood is nearer to latewood than its middle; a crack beside stiffer wood is turned away from it (Hutchinson, Mear
-    // and Rice 1987, for one boundary). Said twice: by K_II, and by the energy that a branch of four cells releases either way.
+    // Said twice: by K_II, and by the energy that a branch of four cells releases either way.
     const double middle = 0.5 * (1.0 - latewood_fraction) * period, branch = 0.4e-3, angle = 15.0 * degree;
     for (const double off : {-0.5e-3, -0.3e-3, 0.3e-3, 0.5e-3}) {
         const TipLoad load = AlongRings(middle + off).run.load();
