@@ -24,7 +24,7 @@ struct EnergyBooks {
     double strain = 0;    // in the points, and in the ties at a crack tip
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
-    double fracture = 0;  // what the tips have taken up: toughness times new crack area; more where waves hold a tip back
+    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back
     double damped = 0;    // by drag, and by friction and impact of contacts
 };
 
