@@ -51,6 +51,11 @@ double length_inside(const std::vector<Vec2>& points, const Box& box) {
     return length;
 }
 
+// Told by the box around a segment: it comes no nearer to x than this. Of a long crack few segments are left by it.
+bool lies_beyond(double distance, const Vec2& from, const Vec2& to, const Vec2& x) {
+    return (from.cwiseMin(to) - x).maxCoeff() > distance || (x - from.cwiseMax(to)).maxCoeff() > distance;
+}
+
 } // namespace
 
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) {
@@ -84,6 +89,7 @@ Vec2 CrackLine::direction_near(bool at_end, const Vec2& x) const {
     Vec2 direction = tip(at_end).direction;
     double nearest = (x - tip(at_end).position).norm();
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
+        if (lies_beyond(nearest, points[k], points[k + 1], x)) continue;
         const Vec2 along = points[k + 1] - points[k];
         const double distance = (x - points[k] - nearest_on_segment(points[k], points[k + 1], x) * along).norm();
         if (distance < nearest * (1.0 - 1e-12)) {
@@ -148,7 +154,10 @@ bool CrackFields::is_left(int crack, const Vec2& x) const {
     const double rounding = 1e-9 * body_->layout.cell.minCoeff();  // a node on the crack counts as left of it
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
+    const double reach = std::sqrt(std::min((x - points.front()).squaredNorm(), (x - points.back()).squaredNorm())) + 2.0 * rounding;
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
+        const bool at_an_end = k == 0 || k + 2 == points.size();
+        if (!at_an_end && lies_beyond(reach, points[k], points[k + 1], x)) continue;
         const Vec2 along = points[k + 1] - points[k];
         const double whole = along.norm();
         // The first and the last segment go on beyond the crack: a tip's cell is cut as if the crack ran on straight.

@@ -24,7 +24,7 @@ struct EnergyBooks {
     double strain = 0;    // in the points, and in the ties at a crack tip
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
-    double fracture = 0;  // toughness times new crack area
+    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back
     double damped = 0;    // by drag, and by friction and impact of contacts
 };
 
@@ -45,7 +45,8 @@ class ExplicitSolver {
     void step();
 
     /// Lets each growing tip go on until it has taken up as much energy as the toughness asks for, but no faster than a Rayleigh
-    /// wave in the wood at the tip (Freund 1990). Before every step.
+    /// wave in the wood at the tip (Freund 1990): where that holds it back it takes up all that its way releases, as wood whose
+    /// toughness rises without bound toward that speed. Before every step.
     void grow_cracks();
 
     TipLoad load_at(int crack, bool at_end) const;

@@ -102,11 +102,11 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
     return std::any_of(live_.begin(), live_.end(), [&](std::size_t k) { return is_of(cracks, cracks.pairs[k], crack, at_end); });
 }
 
-double TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                             const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const {
+TipTies::Advance TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
+                                       const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const {
     const double width_here = width(cracks.lines[crack].tip(at_end));
-    const auto left_over = [&](double way) {  // [J]
-        double sum = -toughness * thickness_ * way;
+    const auto taken_on = [&](double way) {  // [J]
+        double sum = 0.0;
         for (const std::size_t k : live_) {
             const FieldPair& pair = cracks.pairs[k];
             const Tie& tie = ties_[k];
@@ -120,13 +120,14 @@ double TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, 
         }
         return sum;
     };
-    if (left_over(most) >= 0.0) return most;
+    const auto asked_on = [&](double way) { return toughness * thickness_ * way; };
+    if (const double taken = taken_on(most); taken >= asked_on(most)) return {most, taken};
     double low = 0.0, high = most;
     for (int k = 0; k < 20; ++k) {
         const double middle = 0.5 * (low + high);
-        (left_over(middle) > 0.0 ? low : high) = middle;
+        (taken_on(middle) > asked_on(middle) ? low : high) = middle;
     }
-    return low;
+    return {low, asked_on(low)};
 }
 
 } // namespace crampfit

@@ -40,8 +40,12 @@ class TipTies {
     /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for. Over a step
     /// of central differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch of this step
     /// times that of the one before: a step `dt` [s] back, by the velocities.
-    double balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                        const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const;
+    struct Advance {
+        double way;    // [m]
+        double taken;  // what the ties give up on it [J]: more than the toughness asks for where `most` ends the way
+    };
+    Advance balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
+                         const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const;
 
     bool holds(const CrackFields& cracks, int crack, bool at_end) const;
 

@@ -1,5 +1,6 @@
 // Energy release rate at rest against exact values, and against the change of energy with crack length. At equilibrium; the
 // explicit solver, damped to rest, has one check of each kind.
+#include "benchmarks/reference_problems.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -63,6 +64,24 @@ TEST(VerificationCentreCrack, JConvergesToTheExactValue) {
 TEST(SlowVerificationCentreCrack, JAtFortyCells) { check_centre_crack(40.0, 0.005); }
 
 TEST(VerificationCentreCrack, ExplicitAtFiveCells) { check_centre_crack(5.0, 0.04, true); }
+
+// Loaded slowly in motion, on the square that `crampfit bench` cuts out of an infinite plate (Westergaard 1939).
+void check_slowly_loaded(double cells, double bar) {
+    const Problem plate = problems().front();
+    const Record record = simulate(in_damped_motion(plate.scene(cells, 4), plate.slowest));
+    const double error = plate.ratio(record) - 1.0;
+    std::printf("centre crack loaded slowly, %2.0f cells per half crack: J off by %+.2f %%, %ld points, %.2f s\n", cells, 100 * error,
+                record.points, record.seconds);
+    EXPECT_LT(std::abs(error), bar) << cells << " cells";
+}
+
+TEST(VerificationCentreCrack, LoadedSlowly) {
+    for (const auto& [cells, bar] : {std::pair{5.0, 0.04}, {10.0, 0.02}}) check_slowly_loaded(cells, bar);
+}
+
+TEST(SlowVerificationCentreCrack, LoadedSlowlyOnFinerGrids) {
+    for (const auto& [cells, bar] : {std::pair{20.0, 0.01}, {40.0, 0.005}}) check_slowly_loaded(cells, bar);
+}
 
 TEST(VerificationCentreCrack, JDoesNotDependOnWhereInACellTheTipLies) {
     for (const double lift : {0.0, 0.5}) {
