@@ -6,7 +6,8 @@
 
 namespace crampfit {
 
-InternalForce::InternalForce(const Discretisation& body, bool rotates) : body_(body), rotates_(rotates), strips_(body.layout) {
+InternalForce::InternalForce(const Discretisation& body, bool rotates, History* history)
+    : body_(body), rotates_(rotates), history_(history), strips_(body.layout) {
     sort_cells();
 }
 
@@ -16,10 +17,11 @@ void InternalForce::sort_cells() {
     whole_cells_.clear();
     loose_points_.clear();
     alone_.clear();
+    remembering_.clear();
     first_of_strip_.clear();
     for (int c = 0; c < layout.cells(); ++c) {
         if (c == strips_.first_cell(static_cast<int>(first_of_strip_.size())))
-            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
+            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
         const int first = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
         const auto alike = [&](int p) {
@@ -27,16 +29,17 @@ void InternalForce::sort_cells() {
             for (int q = first; q < last; ++q) count += points.node.same(p, q);
             return count;
         };
-        if (body_.cell_is_full(c) && alike(first) == last - first) {
+        const bool remembers = history_ && history_->is_in(c);
+        if (!remembers && body_.cell_is_full(c) && alike(first) == last - first) {
             whole_cells_.push_back(c);
         } else {
             for (int p = first; p < last; ++p) {
-                loose_points_.push_back(p);
+                (remembers ? remembering_ : loose_points_).push_back(p);
                 if (layout.degree == 1 && alike(p) == 1) alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
             }
         }
     }
-    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
+    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
 }
 
 double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
@@ -186,7 +189,30 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     return sum;
 }
 
+Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(int p, const std::vector<Vec2>& displacement, bool geometric) const {
+    const Mat2 gradient = gradient_at(body_, p, displacement);
+    PlaneResponse response;
+    state_with(gradient, rotates_, [&](const Eigen::Vector3d& strain) { return (response = history_->respond(p, strain)).stress; });
+    const Eigen::Matrix3d& C = response.tangent;
+    const auto stress = [&](double, double, double) { return std::array{response.stress[0], response.stress[1], response.stress[2]}; };
+    const auto A = tangent_with<double>({gradient(0, 0), gradient(0, 1), gradient(1, 0), gradient(1, 1)},
+                                        {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)}, stress, rotates_, geometric);
+    const CellWeights& w = body_.weights[body_.points.slot[p]];
+    Eigen::Matrix<double, 4, 8> slope = Eigen::Matrix<double, 4, 8>::Zero();  // of the gradient xx, xy, yx, yy by the nodes' displacements
+    for (int k = 0; k < 4; ++k)
+        for (int i = 0; i < 2; ++i) slope.block<2, 1>(2 * i, 2 * k + i) << w.slope_x[k], w.slope_y[k];
+    Eigen::Matrix4d tangent;
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) tangent(i, j) = A[i][j];
+    return body_.points.volume[p] * slope.transpose() * tangent * slope;
+}
+
 Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
+    if (history_ && history_->is_in(body_.points.cell[first])) {
+        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+        for (int p = first; p < first + count; ++p) sum += remembering_tangent(p, displacement, geometric);
+        return sum;
+    }
     switch (count) {
         case 1: return tangent_of<1>(first, displacement, geometric);
         case 4: return tangent_of<4>(first, displacement, geometric);
@@ -195,6 +221,26 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const s
         case 25: return tangent_of<25>(first, displacement, geometric);
         default: return tangent(first, 1, displacement, geometric) + tangent(first + 1, count - 1, displacement, geometric);
     }
+}
+
+void InternalForce::add_stress(int p, const Mat2& stress, std::vector<Vec2>& force) const {
+    const CellWeights& w = body_.weights[body_.points.slot[p]];
+    const auto node = body_.points.node[p];
+    for (std::size_t k = 0; k < node.size(); ++k)
+        force[node[k]] -= body_.points.volume[p] * (stress * Vec2(w.slope_x[k], w.slope_y[k]));
+}
+
+double InternalForce::visit_remembering(std::span<const int> points, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+    double energy = 0.0;
+    for (const int p : points) {
+        const PointState state = state_with(gradient_at(body_, p, displacement), rotates_, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d {
+            if (force) return history_->respond(p, strain).stress;
+            energy += body_.points.volume[p] * history_->stored(p, strain);
+            return Eigen::Vector3d::Zero();
+        });
+        if (force) add_stress(p, state.stress, *force);
+    }
+    return energy;
 }
 
 double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
@@ -207,12 +253,9 @@ double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, st
         const int p = loose_points_[i];
         const PointState state = elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
         energy += points.volume[p] * state.energy;
-        if (!force) continue;
-        const CellWeights& w = body_.weights[points.slot[p]];
-        const auto node = points.node[p];
-        for (std::size_t k = 0; k < node.size(); ++k)
-            (*force)[node[k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
+        if (force) add_stress(p, state.stress, *force);
     }
+    energy += visit_remembering({remembering_.data() + from.remembering, to.remembering - from.remembering}, displacement, force);
     for (std::size_t i = from.alone; i < to.alone; ++i) {
         const Alone& a = alone_[i];
         const Vec2 apart = crosswise(a.point, displacement);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "forward/history.hpp"
 #include "forward/strips.hpp"
 
 #include <array>
@@ -16,12 +17,15 @@ namespace crampfit {
 /// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
 /// u_2 + u_3|^2. A straight line among displacements does not feel it. (B-splines reach on into cells with more points.)
 ///
+/// Points that remember are taken one by one, apart from the others: they take a step of their history along.
+///
 /// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
   public:
     static constexpr std::array<double, 4> crosswise_sign{1.0, -1.0, -1.0, 1.0};  // of a cell's nodes
 
-    InternalForce(const Discretisation& body, bool rotates);
+    /// `history`: of the points that have one, null where none does.
+    InternalForce(const Discretisation& body, bool rotates, History* history = nullptr);
 
     /// Call after points changed their fields.
     void sort_cells();
@@ -43,12 +47,12 @@ class InternalForce {
     double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
     Vec2 crosswise(int point, const std::vector<Vec2>& displacement) const;  // u_0 - u_1 - u_2 + u_3 [m]
 
-    /// Strain energy of all points [J].
+    /// Strain energy of all points; of those that remember as they were settled last [J].
     double energy(const std::vector<Vec2>& displacement) const;
 
   private:
     struct Place {  // in the lists below
-        std::size_t whole_cell, loose_point, alone;
+        std::size_t whole_cell, loose_point, alone, remembering;
     };
 
     // Adds the forces of a strip's points, or, without `force`, returns their strain energy [J].
@@ -58,14 +62,19 @@ class InternalForce {
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     template <int Nodes, int PointsPerCell, bool Rotates>
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    double visit_remembering(std::span<const int> points, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    void add_stress(int point, const Eigen::Matrix2d& stress, std::vector<Vec2>& force) const;
+    Eigen::Matrix<double, 8, 8> remembering_tangent(int point, const std::vector<Vec2>& displacement, bool geometric) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
     const Discretisation& body_;
     bool rotates_;
+    History* history_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
     std::vector<Alone> alone_;
+    std::vector<int> remembering_;
     Strips strips_;
     std::vector<Place> first_of_strip_;  // [strips + 1]
 };

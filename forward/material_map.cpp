@@ -62,12 +62,14 @@ MaterialMap::MaterialMap(const Scene& scene) : scene_(scene) {
     }
     for (int k = 0; k < static_cast<int>(materials_.size()); ++k) pure_.push_back(mix(k, k, 0.0));
     orthotropic_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.orthotropic.has_value(); });
+    remembers_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.remembers(); });
+    const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
+    if (remembers_) check_memory(graded);
     if (!orthotropic_) return;
     check_radial_direction();
     if (plan.pith) homogeneous_ = false;
     if (plan.radial)
         for (LocalWood& wood : pure_) wood.elasticity.normal = {std::cos(*plan.radial), std::sin(*plan.radial)};
-    const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
     for (int k = 0; graded && k + 1 < static_cast<int>(materials_.size()); ++k) check_transition(k);
 }
 
@@ -92,6 +94,17 @@ void MaterialMap::check_transition(int first) const {
     }
 }
 
+void MaterialMap::check_memory(bool graded) const {
+    if (graded)
+        throw InputError(scene_.file.string(), scene_.specimen.rings ? "specimen.rings.transition" : "specimen", "transition wood",
+                         "not available with viscoelastic or plastic wood: how such wood goes over into other wood is not known; leave the "
+                         "transition out, or give it a class and a material of its own");
+    for (const auto& [name, material] : scene_.materials)
+        if (orthotropic_ && material.orthotropic)
+            throw InputError(scene_.file.string(), "materials." + name + ".kind", "orthotropic",
+                             "not available beside viscoelastic or plastic wood; use \"isotropic\"");
+}
+
 LocalWood MaterialMap::mix(int first, int second, double grade) const {
     const Material material = first == second
                                   ? materials_[first]
@@ -107,6 +120,7 @@ LocalWood MaterialMap::mix(int first, int second, double grade) const {
         wood.poisson_ratios.setConstant(material.poisson_ratio);
     }
     wood.filled = 1.0;
+    wood.material = grade == 0.0 ? first : -1;
     const double last = std::max<double>(1.0, static_cast<double>(materials_.size()) - 1.0);
     wood.latewood = (first + grade * (second - first)) / last;
     return wood;
@@ -171,12 +185,36 @@ const LocalWood* MaterialMap::band_around(const Vec2& centre, const Vec2& half) 
     return low > latewood_start && high < 1.0 ? &pure_[1] : nullptr;
 }
 
+// Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
+int MaterialMap::samples_a_side(const Vec2& half) const {
+    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
+    return std::clamp(fit, 2, 16);
+}
+
+std::vector<double> MaterialMap::shares(const Vec2& centre, const Vec2& half) const {
+    std::vector<double> shares(materials_.size(), 0.0);
+    const LocalWood* all = homogeneous_ ? &pure_[0] : band_around(centre, half);
+    if (all) {
+        shares[all->material] = 1.0;
+        return shares;
+    }
+    const int samples = samples_a_side(half);
+    double filled = 0.0;
+    for (int k = 0; k < samples * samples; ++k) {
+        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const LocalWood here = at(centre + place.cwiseProduct(half));
+        if (here.filled == 0.0) continue;
+        shares[here.material] += 1.0;
+        filled += 1.0;
+    }
+    for (double& share : shares) share /= std::max(1.0, filled);
+    return shares;
+}
+
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (homogeneous_) return pure_[0];
     if (const LocalWood* wood = band_around(centre, half)) return *wood;
-    // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
-    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
-    const int samples = std::clamp(fit, 2, 16);
+    const int samples = samples_a_side(half);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
     std::vector<double> latewood(static_cast<std::size_t>(samples) * samples, 0.0);  // layers lie as it does, whatever the moduli

@@ -7,16 +7,24 @@
 
 namespace crampfit {
 
-Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement) {
+Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement,
+                 const History* history) {
     Frame frame;
     const Points& points = body.points;
     for (int p = 0; p < points.count(); ++p) {
-        const PointState state = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates);
+        const bool remembers = history && history->is_in(points.cell[p]);
+        Tensor remembered;
+        const PointState state = state_with(gradient_at(body, p, displacement), plan.rotates, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d {
+            if (!remembers) return points.stiffness_of(p) * strain;
+            remembered = history->stress(p, strain);
+            return {remembered[0], remembered[1], remembered[3]};
+        });
         const double xx = state.stress(0, 0);
         const double yy = state.stress(1, 1);
         const double xy = 0.5 * (state.stress(0, 1) + state.stress(1, 0));
         double zz = 0.0;
-        if (scene.model.plane == PlaneCondition::strain)
+        if (remembers) zz = remembered[2];
+        else if (scene.model.plane == PlaneCondition::strain)
             zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy) : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
         frame.moved.push_back(value_at(body, p, displacement).cast<float>());
         frame.stress.push_back(Eigen::Vector4d(xx, yy, xy, zz).cast<float>());
@@ -168,7 +176,7 @@ void Recorder::read_probes_now() {
 
 void Recorder::save_frame() {
     ++frames_saved_;
-    record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements()));
+    record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements(), solver_.history()));
     Frame& frame = record_.frames.back();
     frame.time = solver_.time();
     frame.displacement = now().displacement;
