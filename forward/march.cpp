@@ -15,7 +15,7 @@ namespace crampfit {
 namespace {
 
 constexpr double steps_in_run = 100.0;
-constexpr double steps_in_relaxation = 10.0;
+constexpr double steps_in_relaxation = 20.0;
 constexpr double growth_of_steps = 1.25;
 
 // A step that finds no equilibrium is taken in so many parts at most.

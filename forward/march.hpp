@@ -9,7 +9,7 @@
 namespace crampfit {
 
 /// The times at which equilibrium is found where wood remembers [s]: from 0, or the first step, to the end of the run. Even steps where
-/// the scene gives one. Else steps of a hundredth of the run at most, which begin with a tenth of the shortest relaxation time at the
+/// the scene gives one. Else steps of a hundredth of the run at most, which begin with a twentieth of the shortest relaxation time at the
 /// start and wherever an edge or body stops, and grow from there by a quarter each. What stops, frames and probes have times of their
 /// own among them.
 std::vector<double> march_times(const Scene& scene, const Plan& plan, const MaterialMap& materials);
