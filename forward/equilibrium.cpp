@@ -187,14 +187,9 @@ void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::
 // Points of a cell that follow each other on the same fields go together.
 template <class Visit>
 void Equilibrium::for_groups_of(int c, const Visit& visit) const {
-    const Points& points = body_.points;
-    int p = points.first_of_cell[c];
-    const int last = points.first_of_cell[c + 1];
-    while (p < last) {
-        const int first = p;
-        while (p < last && points.node.same(p, first)) ++p;
-        visit(points.node[first], first, p - first);
-    }
+    for_groups(body_.points, c, [&](const PointGroup& group) {
+        visit(std::as_const(body_.points).node[group.first], group.first, group.count);
+    });
 }
 
 // The same of the points.

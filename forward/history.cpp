@@ -40,7 +40,7 @@ History::History(const MaterialMap& materials, const Discretisation& body, Plane
 void History::add_wood(const MaterialMap& materials, const std::vector<int>& laws, PlaneCondition plane, int c) {
     const Vec2 half = 0.5 * body_.layout.cell;
     const std::vector<double> shares = materials.shares(body_.layout.cell_corner(c) + half, half);
-    Wood wood{c, {}, body_.wood_of_cell(materials, c).elasticity.normal, 0, before_.size()};
+    Wood wood{c, {}, body_.wood_of_cell(materials, c).elasticity.normal, 0, false, before_.size()};
     Layer elastic{-1, 0.0, 0.0, 0, 0, Eigen::Matrix3d::Zero(), 0.0};  // all elastic wood together
     LayeredElasticity mean;
     mean.normal = wood.normal;
@@ -49,6 +49,7 @@ void History::add_wood(const MaterialMap& materials, const std::vector<int>& law
         if (laws[k] >= 0) {
             wood.layers.push_back({laws[k], shares[k], 0.0, wood.row, 0, {}, 0.0});
             wood.row += laws_[laws[k]].variables();
+            wood.flows = wood.flows || (plane_strain_ && materials.materials()[k].plastic);
         } else {
             const Material& material = materials.materials()[k];
             elastic.share += shares[k];

@@ -20,6 +20,7 @@ class History {
     History(const MaterialMap& materials, const Discretisation& body, PlaneCondition plane);
 
     bool is_in(int cell) const { return cell_[cell] >= 0; }
+    bool flows_in_plane(int cell) const { return is_in(cell) && woods_[cell_[cell]].flows; }  // some of it is plastic, in plane strain
     int cells() const { return static_cast<int>(woods_.size()); }
     std::size_t bytes() const { return 2 * sizeof(double) * before_.size(); }
 
@@ -62,6 +63,7 @@ class History {
         std::vector<Layer> layers;
         Vec2 normal;
         int row;                  // values a point
+        bool flows;
         std::size_t first;        // of them
     };
     const Wood& wood_of(int point) const { return woods_[cell_[body_.points.cell[point]]]; }

@@ -34,9 +34,10 @@ void InternalForce::sort_cells() {
             whole_cells_.push_back(c);
         } else {
             for (int p = first; p < last; ++p) {
-                (remembers ? remembering_ : loose_points_).push_back(p);
+                if (!remembers) loose_points_.push_back(p);
                 if (layout.degree == 1 && alike(p) == 1) alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
             }
+            if (remembers) for_groups(points, c, [&](const PointGroup& group) { remembering_.push_back(group); });
         }
     }
     first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
@@ -189,30 +190,54 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     return sum;
 }
 
-Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(int p, const std::vector<Vec2>& displacement, bool geometric) const {
-    const Mat2 gradient = gradient_at(body_, p, displacement);
-    PlaneResponse response;
-    state_with(gradient, rotates_, [&](const Eigen::Vector3d& strain) { return (response = history_->respond(p, strain)).stress; });
-    const Eigen::Matrix3d& C = response.tangent;
-    const auto stress = [&](double, double, double) { return std::array{response.stress[0], response.stress[1], response.stress[2]}; };
-    const auto A = tangent_with<double>({gradient(0, 0), gradient(0, 1), gradient(1, 0), gradient(1, 1)},
-                                        {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)}, stress, rotates_, geometric);
-    const CellWeights& w = body_.weights[body_.points.slot[p]];
-    Eigen::Matrix<double, 4, 8> slope = Eigen::Matrix<double, 4, 8>::Zero();  // of the gradient xx, xy, yx, yy by the nodes' displacements
-    for (int k = 0; k < 4; ++k)
-        for (int i = 0; i < 2; ++i) slope.block<2, 1>(2 * i, 2 * k + i) << w.slope_x[k], w.slope_y[k];
-    Eigen::Matrix4d tangent;
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) tangent(i, j) = A[i][j];
-    return body_.points.volume[p] * slope.transpose() * tangent * slope;
+// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what the
+// stress, shared as the strain is, puts on the change of B as it is.
+Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const {
+    using Slope = Eigen::Matrix<double, 3, 8>;
+    using Gradients = Eigen::Matrix<double, 4, 8>;
+    const SeenStrains seen(body_, *history_, group, displacement, rotates_);
+    std::array<Gradients, most_in_group> gradients;  // xx, xy, yx, yy by the nodes' displacements
+    std::array<Slope, most_in_group> slopes;
+    std::array<Eigen::Vector3d, most_in_group> stresses;
+    std::array<Eigen::Matrix3d, most_in_group> tangents;
+    for (int i = 0; i < group.count; ++i) {
+        const CellWeights& w = body_.weights[body_.points.slot[group.first + i]];
+        gradients[i].setZero();
+        for (int k = 0; k < 4; ++k)
+            for (int axis = 0; axis < 2; ++axis) gradients[i].block<2, 1>(2 * axis, 2 * k + axis) << w.slope_x[k], w.slope_y[k];
+        if (rotates_) {
+            const Polar polar(seen.gradient[i]);
+            Eigen::Matrix4d back = Eigen::Matrix4d::Zero();  // R^T dF of dF
+            for (int a = 0; a < 2; ++a)
+                for (int b = 0; b < 2; ++b) back.block<2, 2>(2 * a, 2 * b).diagonal().setConstant(polar.turn(b, a));
+            slopes[i] = polar.strain_slope() * back * gradients[i];
+        } else {
+            slopes[i] << gradients[i].row(0), gradients[i].row(3), gradients[i].row(1) + gradients[i].row(2);
+        }
+        const PlaneResponse response = history_->respond(group.first + i, seen.strain[i]);
+        stresses[i] = response.stress;
+        tangents[i] = response.tangent;
+    }
+    seen.share(slopes);
+    seen.share(stresses);
+    Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+    for (int i = 0; i < group.count; ++i) {
+        const double volume = body_.points.volume[group.first + i];
+        sum += volume * slopes[i].transpose() * tangents[i] * slopes[i];
+        if (!rotates_ || !geometric) continue;
+        const Mat2& G = seen.gradient[i];
+        const auto stress = [&](double, double, double) { return std::array{stresses[i][0], stresses[i][1], stresses[i][2]}; };
+        const auto A = tangent_with<double>({G(0, 0), G(0, 1), G(1, 0), G(1, 1)}, {}, stress, true, true);
+        Eigen::Matrix4d turning;
+        for (int a = 0; a < 4; ++a)
+            for (int b = 0; b < 4; ++b) turning(a, b) = A[a][b];
+        sum += volume * gradients[i].transpose() * turning * gradients[i];
+    }
+    return sum;
 }
 
 Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
-    if (history_ && history_->is_in(body_.points.cell[first])) {
-        Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
-        for (int p = first; p < first + count; ++p) sum += remembering_tangent(p, displacement, geometric);
-        return sum;
-    }
+    if (history_ && history_->is_in(body_.points.cell[first])) return remembering_tangent({first, count}, displacement, geometric);
     switch (count) {
         case 1: return tangent_of<1>(first, displacement, geometric);
         case 4: return tangent_of<4>(first, displacement, geometric);
@@ -230,15 +255,22 @@ void InternalForce::add_stress(int p, const Mat2& stress, std::vector<Vec2>& for
         force[node[k]] -= body_.points.volume[p] * (stress * Vec2(w.slope_x[k], w.slope_y[k]));
 }
 
-double InternalForce::visit_remembering(std::span<const int> points, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     double energy = 0.0;
-    for (const int p : points) {
-        const PointState state = state_with(gradient_at(body_, p, displacement), rotates_, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d {
-            if (force) return history_->respond(p, strain).stress;
-            energy += body_.points.volume[p] * history_->stored(p, strain);
-            return Eigen::Vector3d::Zero();
-        });
-        if (force) add_stress(p, state.stress, *force);
+    for (const PointGroup& group : groups) {
+        const SeenStrains seen(body_, *history_, group, displacement, rotates_);
+        std::array<Eigen::Vector3d, most_in_group> stresses;
+        for (int i = 0; i < group.count; ++i) {
+            const int p = group.first + i;
+            if (force) stresses[i] = history_->respond(p, seen.strain[i]).stress;
+            else energy += body_.points.volume[p] * history_->stored(p, seen.strain[i]);
+        }
+        if (!force) continue;
+        seen.share(stresses);
+        for (int i = 0; i < group.count; ++i) {
+            const auto stress = [&](const Eigen::Vector3d&) { return stresses[i]; };
+            add_stress(group.first + i, state_with(seen.gradient[i], rotates_, stress).stress, *force);
+        }
     }
     return energy;
 }

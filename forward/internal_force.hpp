@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/history.hpp"
+#include "forward/seen_strain.hpp"
 #include "forward/strips.hpp"
 
 #include <array>
@@ -17,7 +17,7 @@ namespace crampfit {
 /// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
 /// u_2 + u_3|^2. A straight line among displacements does not feel it. (B-splines reach on into cells with more points.)
 ///
-/// Points that remember are taken one by one, apart from the others: they take a step of their history along.
+/// Points that remember are taken apart from the others: they take a step of their history along.
 ///
 /// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
@@ -62,9 +62,9 @@ class InternalForce {
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     template <int Nodes, int PointsPerCell, bool Rotates>
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    double visit_remembering(std::span<const int> points, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     void add_stress(int point, const Eigen::Matrix2d& stress, std::vector<Vec2>& force) const;
-    Eigen::Matrix<double, 8, 8> remembering_tangent(int point, const std::vector<Vec2>& displacement, bool geometric) const;
+    Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
@@ -74,7 +74,7 @@ class InternalForce {
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
     std::vector<Alone> alone_;
-    std::vector<int> remembering_;
+    std::vector<PointGroup> remembering_;
     Strips strips_;
     std::vector<Place> first_of_strip_;  // [strips + 1]
 };

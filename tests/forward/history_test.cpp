@@ -342,33 +342,28 @@ TEST(GradientHistory, TangentAndTurningOfCells) {
             // Further strain.
             history.go_to(0.7);
             for (Vec2& moved : u) moved *= 1.4;
-            double worst = 0.0;
-            for (int c = 0; c < body.layout.cells(); c += 7) {
-                const int first = body.points.first_of_cell[c];
-                const Eigen::Matrix<double, 8, 8> tangent = internal.tangent(first, 4, u, true);
-                const auto cell_nodes = body.layout.cell_nodes(c);
-                const auto of_cell = [&](const std::vector<Vec2>& moved) {
-                    // Other cells' forces do not change where only nodes move that they do not see: take the cell alone.
-                    Eigen::Matrix<double, 8, 1> sum = Eigen::Matrix<double, 8, 1>::Zero();
-                    for (int p = first; p < first + 4; ++p) {
-                        const Eigen::Matrix3d C = body.points.stiffness_of(p);
-                        const PointState state = state_with(gradient_at(body, p, moved), true, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d {
-                            return history.is_in(c) ? history.respond(p, strain).stress : Eigen::Vector3d(C * strain);
-                        });
-                        const CellWeights& w = body.weights[body.points.slot[p]];
-                        for (int k = 0; k < 4; ++k)
-                            sum.segment<2>(2 * k) += body.points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
-                    }
-                    return sum;
-                };
-                for (int k = 0; k < 8; ++k) {
-                    const double h = 1e-9;
-                    std::vector<Vec2> more = u, less = u;
-                    more[cell_nodes[k / 2]][k % 2] += h;
-                    less[cell_nodes[k / 2]][k % 2] -= h;
-                    worst = std::max(worst, ((of_cell(more) - of_cell(less)) / (2 * h) - tangent.col(k)).norm() / tangent.norm());
-                }
+            std::vector<Vec2> way(nodes), more = u, less = u, slope(nodes, Vec2::Zero());
+            const double h = 1e-9;
+            for (int n = 0; n < nodes; ++n) {
+                way[n] = {std::sin(7.0 * n), std::cos(11.0 * n)};
+                more[n] += h * way[n];
+                less[n] -= h * way[n];
             }
+            forces(u);
+            for (int c = 0; c < body.layout.cells(); ++c) {
+                const auto cell_nodes = body.layout.cell_nodes(c);
+                Eigen::Matrix<double, 8, 1> step;
+                for (int k = 0; k < 4; ++k) step.segment<2>(2 * k) = way[cell_nodes[k]];
+                const Eigen::Matrix<double, 8, 1> change = internal.tangent(body.points.first_of_cell[c], 4, u, true) * step;
+                for (int k = 0; k < 4; ++k) slope[cell_nodes[k]] -= change.segment<2>(2 * k);
+            }
+            const std::vector<Vec2> above = forces(more), below = forces(less);
+            double worst = 0.0, steepest = 0.0;
+            for (int n = 0; n < nodes; ++n) {
+                steepest = std::max(steepest, slope[n].norm());
+                worst = std::max(worst, ((above[n] - below[n]) / (2 * h) - slope[n]).norm());
+            }
+            worst /= steepest;
             std::printf("tangent off by %.1e\n", worst);
             EXPECT_LT(worst, 1e-6);
         }
@@ -399,23 +394,82 @@ TEST(UnitHistory, LayersAreElasticAtOnce) {
     EXPECT_LT(remembering, body.layout.cells());
 }
 
-// Wood that cannot flow yet, or relaxes too slowly to be seen, is elastic wood, a crack and wheels included.
-TEST(VerificationHistory, ComesToElasticWood) {
-    Scene scene = ring_specimen(3e-3, 0.5e-3);
-    scene = at_equilibrium(scene);
-    scene.edges[0].velocity[1] = 1e-4;
-    scene.edges[0].until = 1.0;
-    scene.stop.time = 1.0;
-    scene.solver.extrapolate = false;
-    const double elastic = simulate(scene).series.back().force;
-    for (const Material& wood : {flowing(1e12, 0.0), relaxing(0.5, 1e9)}) {
-        Scene other = scene;
-        other.materials["EW"] = wood;
-        const Record record = simulate(other);
-        ASSERT_EQ(record.status, RunStatus::finished);
-        EXPECT_NEAR(record.series.back().force, elastic, 1e-6 * elastic);
-        EXPECT_TRUE(std::isnan(record.series.back().G));  // not known in wood that remembers
+// Of perfectly plastic wood between rough platens, no wider than high, the limit is the same (Hill 1950, ch. 9): it is reached only where
+// points may flow without a change of volume, and else the load rises without end. The platens' corners leave an error of first order.
+TEST(VerificationHistory, RoughBlockComesToItsLimit) {
+    for (const double cell : {0.5e-3, 0.25e-3}) {
+        Scene scene = at_rest({4e-3, 4e-3}, cell);
+        scene.materials["EW"] = flowing(0.4e6, 0.0);
+        scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0}), moving("top", Side::top, {0.0, -0.2e-3})};
+        scene.measure = {"top", "top"};
+        StaticTrial run(scene, false);
+        double before = 0.0, after = 0.0;
+        for (int k = 1; k <= 50; ++k) {
+            ASSERT_TRUE(run.solve(0.02 * k));
+            if (k == 40) before = -run.equilibrium.reactions()[1].y();
+        }
+        after = -run.equilibrium.reactions()[1].y();
+        const double limit = 2 / std::sqrt(3.0) * 0.4e6 * 4e-3;
+        std::printf("rough block, cell %g mm: limit off by %.1e, rises by %.1e over the last fifth\n", cell * 1e3, after / limit - 1, after / before - 1);
+        EXPECT_NEAR(after, limit, 0.05 * cell / 0.5e-3 * limit);
+        EXPECT_LT(after / before - 1, 2e-3);
     }
+}
+
+// Wood that cannot flow yet, or relaxes too slowly to be seen, is elastic wood, a crack included.
+TEST(VerificationHistory, ComesToElasticWood) {
+    for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
+        Scene scene = at_equilibrium(ring_specimen(3e-3, 0.5e-3));
+        scene.model.plane = plane;
+        scene.edges[0].velocity[1] = 1e-4;
+        scene.edges[0].until = 1.0;
+        scene.stop.time = 1.0;
+        scene.solver.extrapolate = false;
+        const double elastic = simulate(scene).series.back().force;
+        for (const Material& wood : {flowing(1e12, 0.0), relaxing(0.5, 1e9)}) {
+            Scene other = scene;
+            other.materials["EW"] = wood;
+            other.solver.time_step = 0.25;
+            const Record record = simulate(other);
+            ASSERT_EQ(record.status, RunStatus::finished);
+            // In plane strain cells of plastic wood have one dilatation each, with the error of the grid's that it makes.
+            const bool other_cells = wood.plastic && plane == PlaneCondition::strain;
+            EXPECT_NEAR(record.series.back().force, elastic, (other_cells ? 1e-2 : 1e-6) * elastic);
+            EXPECT_TRUE(std::isnan(record.series.back().G));  // not known in wood that remembers
+        }
+    }
+}
+
+// Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in elastic
+// wood, and the books close. Where nothing relaxes it is elastic wood.
+TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
+    Scene scene = block({10e-3, 10e-3}, 0.4e-3);
+    scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(0, 5e-3), Vec2(2.5e-3, 5e-3)};
+    crack.grows = Growth::end;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.solver.damping = 1e4;
+    scene.stop.displacement = 0.3e-3;
+    const auto first_growth = [](const Record& record) {
+        return std::find_if(record.series.begin(), record.series.end(), [&](const Instant& row) { return row.crack_length > 2.6e-3; })->displacement;
+    };
+    const Record elastic = simulate(scene);
+    scene.materials["EW"] = relaxing(0.5, 1e6);
+    const Record slow = simulate(scene);
+    EXPECT_NEAR(slow.series.back().crack_length, elastic.series.back().crack_length, 1e-6 * 5e-3);
+    EXPECT_NEAR(slow.series.back().external_work, elastic.series.back().external_work, 1e-6 * elastic.series.back().external_work);
+    scene.materials["EW"] = relaxing(0.5, 1e-3);
+    const Record relaxed = simulate(scene);
+    std::printf("first growth at %.4f mm in elastic wood, %.4f mm in viscoelastic; books off by %.1e\n", first_growth(elastic) * 1e3,
+                first_growth(relaxed) * 1e3, relaxed.worst_energy_imbalance);
+    EXPECT_GT(first_growth(relaxed), 1.005 * first_growth(elastic));
+    EXPECT_LT(relaxed.worst_energy_imbalance, 0.01);
+    const Instant& last = relaxed.series.back();
+    EXPECT_NEAR(last.fracture_energy, 100.0 * (last.crack_length - 2.5e-3), 0.02 * last.fracture_energy);
+    EXPECT_TRUE(std::isnan(last.G));
 }
 
 TEST(UnitHistory, SameBitsOnAnyNumberOfThreads) {
@@ -458,6 +512,9 @@ TEST(UnitHistory, Refusals) {
     EXPECT_NO_THROW(explain(other));
     other.cracks[0].direction = GrowthDirection::hoop_stress;
     refuses(other, "cracks.0.direction");
+    other.cracks[0].direction = GrowthDirection::straight;
+    other.materials["EW"] = relaxing(0.5, 1e-4);
+    refuses(other, "materials.EW.prony.0.tau");
     other = scene;
     other.cracks[0].grows = Growth::end;
     other.cracks[0].advance = 1e-3;
