@@ -16,6 +16,9 @@ namespace {
 constexpr double rounding = 1e-12;
 constexpr int most_iterations = 60;
 
+// Of the stiffest layer: layers that all flow along their boundary leave none there.
+constexpr double least_stiffness = 1e-13;
+
 // Strain xx, yy, 2 xy per jump a: the symmetric part of a (x) n. Its transpose takes a stress to the traction on a face across n.
 Eigen::Matrix<double, 3, 2> strain_per_jump(const Vec2& n) {
     Eigen::Matrix<double, 3, 2> M;
@@ -117,9 +120,10 @@ PlaneResponse History::respond(const Wood& wood, std::size_t number, const Eigen
     Vec2 residual = off(a);
     Eigen::Matrix2d stiffness = Eigen::Matrix2d::Zero();
     for (int k = 0; k < most_iterations; ++k) {
+        const double stiffest = own.tangent.norm() + others.tangent.norm();
         stiffness = M.transpose() * (g * own.tangent + f * others.tangent) * M;
-        const double scale = (own.tangent.norm() + others.tangent.norm()) * (strain.norm() + a.norm());
-        if (residual.norm() <= rounding * scale) break;
+        stiffness.diagonal().array() += least_stiffness * stiffest;
+        if (residual.norm() <= rounding * stiffest * (strain.norm() + a.norm())) break;
         Vec2 step = -stiffness.inverse() * residual;
         const double size = residual.norm();
         residual = off(a + step);

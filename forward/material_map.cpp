@@ -96,7 +96,9 @@ void MaterialMap::check_transition(int first) const {
 
 void MaterialMap::check_memory(bool graded) const {
     if (graded)
-        throw InputError(scene_.file.string(), scene_.specimen.rings ? "specimen.rings.transition" : "specimen", "transition wood",
+        throw InputError(scene_.file.string(),
+                         scene_.specimen.rings ? "specimen.rings.transition" : scene_.specimen.picture ? "specimen.between" : "specimen.file",
+                         scene_.specimen.rings ? fmt::format("{:g} mm", scene_.specimen.rings->transition * 1e3) : "transition wood",
                          "not available with viscoelastic or plastic wood: how such wood goes over into other wood is not known; leave the "
                          "transition out, or give it a class and a material of its own");
     for (const auto& [name, material] : scene_.materials)

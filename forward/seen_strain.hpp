@@ -44,8 +44,6 @@ class SeenStrains {
         share(strain);
     }
 
-    bool shares() const { return shares_; }
-
     /// Puts the mean trace of all in the place of each one's.
     template <class Rows>
     void share(std::array<Rows, most_in_group>& values) const {
