@@ -141,6 +141,40 @@ TEST(VerificationHistory, RelaxationAndCreepInMotion) {
     }
 }
 
+// A wheel that follows a force sinks as it would into elastic wood of E over the creep function, as long as what it touches grows (Lee and
+// Radok 1960; Poisson's ratio stays what it is).
+TEST(VerificationHistory, WheelSinksIn) {
+    const double share = 0.6, tau = 0.7;
+    std::array<double, 2> worst{};
+    for (const int fineness : {0, 1}) {
+        Scene scene = at_rest({4e-3, 2e-3}, 0.25e-3 / (1 << fineness));
+        scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+        Body wheel;
+        wheel.name = "wheel";
+        wheel.shape = Circle{Vec2(2e-3, 4e-3), 2e-3};
+        wheel.free = {false, true};
+        wheel.force = {0.0, -2e3};
+        scene.bodies = {wheel};
+        scene.measure = {"wheel", "wheel"};
+        scene.solver.extrapolate = false;
+        for (const double time : {0.2, 3.0}) {
+            scene.stop.time = time;
+            scene.materials["EW"] = relaxing(share, tau);
+            const Record creeping = simulate(scene);
+            scene.materials["EW"] = earlywood();
+            scene.materials["EW"].youngs_modulus /= creep(share, tau, time);
+            const Record elastic = simulate(scene);
+            ASSERT_EQ(creeping.status, RunStatus::finished) << creeping.message;
+            worst[fineness] = std::max(worst[fineness], std::abs(creeping.series.back().displacement / elastic.series.back().displacement - 1));
+            EXPECT_LT(creeping.worst_energy_imbalance, 1e-3);
+        }
+    }
+    std::printf("wheel: depth off by %.1e, with cells half as wide by %.1e\n", worst[0], worst[1]);
+    // Springs on the outline are as stiff as the wood at once, and those of the softer wood softer: their depth goes with the cell.
+    EXPECT_LT(worst[0], 0.01);
+    EXPECT_LT(worst[1], 0.6 * worst[0]);
+}
+
 // Free vibration dies out as s of rho s^2 + k^2 E'(s) = 0 has it, E'(s) = E' (1 - g / (1 + s tau)): loss angle and stiffness in one.
 TEST(VerificationHistory, VibrationDiesOut) {
     const double share = 0.1, L = 25e-3;
