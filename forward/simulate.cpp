@@ -70,8 +70,12 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
 
 Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, const SimulateOptions& options) {
     long step = 0;
+    double crack_length = 0.0;  // it stands
+    if (const int crack = tracked_tip(scene).crack; crack >= 0)
+        for (std::size_t k = 0; k + 1 < scene.cracks[crack].points.size(); ++k)
+            crack_length += (scene.cracks[crack].points[k + 1] - scene.cracks[crack].points[k]).norm();
     return march(scene, plan, materials, body, options.threads, [&](double time) {
-        if (options.progress) options.progress({std::clamp(time / plan.end_time, 0.0, 1.0), time, 0.0, step++});
+        if (options.progress) options.progress({std::clamp(time / plan.end_time, 0.0, 1.0), time, crack_length, step++});
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
     });
 }
