@@ -45,6 +45,11 @@ inline constexpr NumberRule youngs_modulus = positive(dimension::pressure);
 inline constexpr NumberRule poisson_ratio{dimension::number, -1, 0.5, true,
                                           "must lie between -1 and 0.5, both excluded"};
 inline constexpr NumberRule orthotropic_poisson_ratio = finite(dimension::number);  // see `broken_rule`
+inline constexpr NumberRule relaxing_share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
+inline constexpr NumberRule relaxation_time = positive(dimension::time);
+inline constexpr NumberRule yield_stress = positive(dimension::pressure);
+inline constexpr NumberRule hardening = not_negative(dimension::pressure);
+inline constexpr NumberRule plastic_strain = positive(dimension::number);
 inline constexpr NumberRule density_exponent = positive(dimension::number);
 inline constexpr NumberRule density = positive(dimension::density);
 inline constexpr NumberRule toughness = positive(dimension::energy_release_rate);
@@ -58,6 +63,7 @@ inline constexpr NumberRule share{dimension::number, 0, 1, false, "must lie betw
 inline constexpr NumberRule compliance = not_negative(dimension::compliance);
 inline constexpr NumberRule force_offset = finite(dimension::force);
 inline constexpr NumberRule displacement_offset = finite(dimension::length);
+inline constexpr NumberRule time_step = positive(dimension::time);
 inline constexpr NumberRule damping = not_negative(dimension::rate);
 }  // namespace limits
 

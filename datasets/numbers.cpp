@@ -84,8 +84,19 @@ class NumberFinder {
         }
         const Material& m = material->second;
         std::map<std::string, SceneNumber> members = elastic_numbers(m);
+        members.merge(memory_numbers(m));
         members.insert({{"density", {&m.density, limits::density}}, {"toughness", {&m.toughness, limits::toughness}}});
-        return member(members, 2);
+        if (part(2) != "prony" || !m.viscoelastic) {
+            return member(members, 2);
+        }
+        const auto found = members.find(fmt::format("prony.{}.{}", part(3), part(4)));
+        if (found == members.end()) {
+            fail(fmt::format(": prony has {} terms, numbered from 0, each with g, k and tau", m.viscoelastic->prony.size()));
+        }
+        if (parts_.size() > 5) {
+            fail(": the key goes too far");
+        }
+        return found->second;
     }
 
     SceneNumber in_specimen() const {
@@ -213,8 +224,7 @@ void set_number(Scene& scene, const std::string& key, double value) {
             check_rings(*scene.specimen.rings, {file, key}, text);
         }
         for (const auto& [name, material] : scene.materials) {
-            const auto broken = material.orthotropic ? broken_rule(*material.orthotropic) : std::nullopt;
-            if (broken) {
+            if (const auto broken = broken_rule(material)) {
                 throw InputError(file, key, text, fmt::format("[materials.{}] {}", name, broken->rule));
             }
         }

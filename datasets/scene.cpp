@@ -153,7 +153,7 @@ void read_updates(const Entry& entry, SolverChoice& solver) {
 }  // namespace
 
 SolverChoice read_solver(const Entry& entry) {
-    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "damping", "extrapolate"});
+    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "damping", "extrapolate", "time_step"});
     SolverChoice solver;
     if (const auto kind = entry.find("kind")) {
         solver.kind = kind->choice<SolverKind>({{"auto", SolverKind::automatic},
@@ -173,6 +173,9 @@ SolverChoice read_solver(const Entry& entry) {
     }
     if (const auto damping = entry.find("damping")) {
         solver.damping = damping->number(limits::damping);
+    }
+    if (const auto step = entry.find("time_step")) {
+        solver.time_step = step->number(limits::time_step);
     }
     return solver;
 }

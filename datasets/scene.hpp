@@ -122,13 +122,45 @@ struct BrokenRule {
 /// nu_ij^2 < E_i / E_j and a positive determinant). Without L constants the limit of the R-T plane alone.
 std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood);
 
+/// A part of the moduli that relaxes with a time of its own.
+struct PronyTerm {
+    double g = 0.0;               // part of the instantaneous shear modulus
+    double k = 0.0;               // part of the instantaneous bulk modulus
+    double tau = 0.0;             // relaxation time [s]
+};
+
+/// Linear viscoelasticity: G(t) = G [1 - sum g (1 - exp(-t / tau))], the bulk modulus alike with k. The material's E and nu are the
+/// instantaneous ones.
+struct Viscoelasticity {
+    std::vector<PronyTerm> prony; // at least one; the sums of g and of k are below 1
+};
+
+/// J2 plasticity with isotropic hardening (Voce 1948): at the equivalent plastic strain a the wood flows at
+/// yield_stress + hardening a + (saturation_stress - yield_stress) (1 - exp(-a / saturation_strain)).
+struct Plasticity {
+    double yield_stress = 0.0;    // in tension [Pa]
+    double hardening = 0.0;       // [Pa]
+    struct Saturation {
+        double stress = 0.0;      // not below the yield stress [Pa]
+        double strain = 0.0;      // 63 % of the way to it are done at this plastic strain
+    };
+    std::optional<Saturation> saturation = {};
+};
+
 struct Material {
     double youngs_modulus = 0.0;  // E [Pa]
     double poisson_ratio = 0.0;   // nu, -1 < nu < 0.5
     double density = 0.0;         // rho [kg/m^3]
     double toughness = 0.0;       // G_c [J/m^2]
     std::optional<OrthotropicElasticity> orthotropic = {};  // in place of E and nu
+    std::optional<Viscoelasticity> viscoelastic = {};
+    std::optional<Plasticity> plastic = {};
+
+    bool remembers() const { return viscoelastic || plastic; }  // stress hangs on the way to a strain
 };
+
+/// What is wrong with numbers of a material that each are allowed, if anything.
+std::optional<BrokenRule> broken_rule(const Material& material);
 
 enum class Side { top, bottom, left, right };
 
@@ -194,6 +226,7 @@ struct SolverChoice {
     StressUpdate stress_update = StressUpdate::last;
     bool extrapolate = true;  // equilibrium: a second grid, twice as coarse, takes off most of the grid's error
     double damping = 0.0;   // mass-proportional, force = -damping * mass * velocity [1/s]
+    std::optional<double> time_step = {};  // of equilibrium with wood that remembers [s]; absent: chosen
 };
 
 /// Whichever comes first; at least one is set.

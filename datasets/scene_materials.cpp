@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace crampfit {
@@ -35,7 +36,61 @@ OrthotropicElasticity read_orthotropic(const Entry& entry, PlaneCondition plane)
     return wood;
 }
 
+Viscoelasticity read_viscoelastic(const Entry& entry) {
+    Viscoelasticity memory;
+    for (const Entry& term : entry.at("prony").list()) {
+        term.only({"g", "k", "tau"});
+        PronyTerm& read = memory.prony.emplace_back();
+        read.tau = term.at("tau").number(limits::relaxation_time);
+        if (!term.has("g") && !term.has("k")) {
+            term.at("g");  // is missed
+        }
+        if (const auto g = term.find("g")) {
+            read.g = g->number(limits::relaxing_share);
+        }
+        if (const auto k = term.find("k")) {
+            read.k = k->number(limits::relaxing_share);
+        }
+    }
+    if (memory.prony.empty()) {
+        entry.at("prony").fail("must hold at least one term, such as { g = 0.2, tau = \"1 s\" }");
+    }
+    return memory;
+}
+
+Plasticity read_plastic(const Entry& entry) {
+    Plasticity memory;
+    memory.yield_stress = entry.at("yield_stress").number(limits::yield_stress);
+    if (const auto hardening = entry.find("hardening")) {
+        memory.hardening = hardening->number(limits::hardening);
+    }
+    if (entry.has("saturation_stress") || entry.has("saturation_strain")) {
+        memory.saturation = {entry.at("saturation_stress").number(limits::yield_stress), entry.at("saturation_strain").number(limits::plastic_strain)};
+    }
+    return memory;
+}
+
 }  // namespace
+
+std::optional<BrokenRule> broken_rule(const Material& material) {
+    if (material.orthotropic) {
+        return broken_rule(*material.orthotropic);
+    }
+    if (material.plastic && material.plastic->saturation && material.plastic->saturation->stress < material.plastic->yield_stress) {
+        return BrokenRule{"saturation_stress", "must not be below yield_stress: the wood hardens as it flows"};
+    }
+    if (material.viscoelastic) {
+        double g = 0.0, k = 0.0;
+        for (const PronyTerm& term : material.viscoelastic->prony) {
+            g += term.g;
+            k += term.k;
+        }
+        if (g >= 1.0 || k >= 1.0) {
+            return BrokenRule{"prony", fmt::format("the sum of all {} must be below 1 and is {:.4g}: some stiffness is left for good", g >= 1.0 ? "g" : "k", std::max(g, k))};
+        }
+    }
+    return std::nullopt;
+}
 
 std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood) {
     const auto too_large = [](const char* key, double ratio, const char* moduli, double modulus, double other) -> std::optional<BrokenRule> {
@@ -85,6 +140,28 @@ std::map<std::string, SceneNumber> elastic_numbers(const Material& material) {
     return numbers;
 }
 
+std::map<std::string, SceneNumber> memory_numbers(const Material& material) {
+    std::map<std::string, SceneNumber> numbers;
+    if (material.viscoelastic) {
+        for (std::size_t i = 0; i < material.viscoelastic->prony.size(); ++i) {
+            const PronyTerm& term = material.viscoelastic->prony[i];
+            const std::string key = fmt::format("prony.{}.", i);
+            numbers.insert({{key + "g", {&term.g, limits::relaxing_share}},
+                            {key + "k", {&term.k, limits::relaxing_share}},
+                            {key + "tau", {&term.tau, limits::relaxation_time}}});
+        }
+    }
+    if (material.plastic) {
+        numbers.insert({{"yield_stress", {&material.plastic->yield_stress, limits::yield_stress}},
+                        {"hardening", {&material.plastic->hardening, limits::hardening}}});
+        if (const auto& saturation = material.plastic->saturation) {
+            numbers.insert({{"saturation_stress", {&saturation->stress, limits::yield_stress}},
+                            {"saturation_strain", {&saturation->strain, limits::plastic_strain}}});
+        }
+    }
+    return numbers;
+}
+
 std::map<std::string, Material> read_materials(const Entry& materials, PlaneCondition plane) {
     enum class Kind { isotropic, orthotropic, viscoelastic, plastic };
     std::map<std::string, Material> result;
@@ -95,21 +172,29 @@ std::map<std::string, Material> read_materials(const Entry& materials, PlaneCond
                                                        {"viscoelastic", Kind::viscoelastic},
                                                        {"plastic", Kind::plastic}})
                                  : Kind::isotropic;
-        if (choice == Kind::viscoelastic || choice == Kind::plastic) {
-            kind->fail(fmt::format("a material of kind \"{}\" is not supported yet", kind->text()));
-        }
         Material material;
         if (choice == Kind::orthotropic) {
             refuse_converse_ratios(entry);
             entry.only({"kind", "E_R", "E_T", "G_RT", "nu_RT", "E_L", "nu_LR", "nu_LT", "density", "toughness"});
             material.orthotropic = read_orthotropic(entry, plane);
-            if (const auto broken = broken_rule(*material.orthotropic)) {
-                entry.at(broken->key).fail(broken->rule);
-            }
         } else {
-            entry.only({"kind", "E", "nu", "density", "toughness"});
+            std::vector<std::string> keys{"kind", "E", "nu", "density", "toughness"};
+            if (choice == Kind::viscoelastic) {
+                keys.push_back("prony");
+            } else if (choice == Kind::plastic) {
+                keys.insert(keys.end(), {"yield_stress", "hardening", "saturation_stress", "saturation_strain"});
+            }
+            entry.only(keys);
             material.youngs_modulus = entry.at("E").number(limits::youngs_modulus);
             material.poisson_ratio = entry.at("nu").number(limits::poisson_ratio);
+            if (choice == Kind::viscoelastic) {
+                material.viscoelastic = read_viscoelastic(entry);
+            } else if (choice == Kind::plastic) {
+                material.plastic = read_plastic(entry);
+            }
+        }
+        if (const auto broken = broken_rule(material)) {
+            entry.at(broken->key).fail(broken->rule);
         }
         material.density = entry.at("density").number(limits::density);
         material.toughness = entry.at("toughness").number(limits::toughness);

@@ -31,6 +31,9 @@ std::map<std::string, SceneNumber> exponent_numbers(const DensityExponents& expo
 /// The elastic constants of a material of this kind by key, with what each may be.
 std::map<std::string, SceneNumber> elastic_numbers(const Material& material);
 
+/// The numbers of a material's memory by key within the material, such as yield_stress and prony.0.g.
+std::map<std::string, SceneNumber> memory_numbers(const Material& material);
+
 /// Throws InputError when latewood and transition together are longer than a ring.
 void check_rings(const Rings& rings, const Place& place, const std::string& value);
 

@@ -43,14 +43,16 @@ struct Polar {
     }
 };
 
-/// Linear elasticity. With `rotates`, of Biot's strain U - I in the frame that turns with the point (F = R U): the same line for
-/// stretch, and no stress from rotation alone. Without, of the small strain.
-inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates) {
+/// What a point is in whose stress xx, yy, xy is `stress_of` its strain xx, yy, 2 xy. With `rotates` these are Biot's strain U - I and its
+/// stress in the frame that turns with the point (F = R U): no stress from rotation alone. Without, the strain is small. The energy is
+/// that of a straight line from no stress to this.
+template <class Stress>
+PointState state_with(const Mat2& gradient, bool rotates, const Stress& stress_of) {
     PointState state;
     state.gradient = gradient;
     if (!rotates) {
         state.strain = 0.5 * (gradient + gradient.transpose());
-        const Eigen::Vector3d s = stiffness * Eigen::Vector3d(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1));
+        const Eigen::Vector3d s = stress_of(Eigen::Vector3d(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1)));
         state.stress << s[0], s[2], s[2], s[1];
         state.energy = 0.5 * state.stress.cwiseProduct(state.strain).sum();
         return state;
@@ -58,7 +60,7 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
     const Polar polar(gradient);
     state.strain = polar.stretch - Mat2::Identity();
     const Eigen::Vector3d strain(state.strain(0, 0), state.strain(1, 1), 2.0 * state.strain(0, 1));
-    const Eigen::Vector3d s = stiffness * strain;
+    const Eigen::Vector3d s = stress_of(strain);
     const Eigen::Vector4d p = polar.strain_slope().transpose() * s;
     Mat2 local;
     local << p[0], p[1], p[2], p[3];
@@ -67,12 +69,17 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
     return state;
 }
 
-/// Second derivative of the energy of `elastic_state` by the displacement gradient, counted xx, xy, yx, yy [Pa]; without `geometric`
-/// only the part that is never negative, which leaves out that stress turns with the point. Numbers are `double`, or arrays of them for
-/// many points at once. Stiffness is counted xx-xx, xx-yy, yy-yy, xy-xy, xx-xy, yy-xy.
-template <class Number>
-std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, bool rotates,
-                                                     bool geometric) {
+/// Linear elasticity: the same line for stretch whatever the rotation.
+inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& stiffness, bool rotates) {
+    return state_with(gradient, rotates, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d { return stiffness * strain; });
+}
+
+/// Derivative of the stress of `state_with` by the displacement gradient, counted xx, xy, yx, yy [Pa], where that of `stress_of` (xx, yy,
+/// xy of strain xx, yy, 2 xy) is C; without `geometric` only the part that is never negative, which leaves out that stress turns with
+/// the point. Numbers are `double`, or arrays of them for many points at once. C is counted xx-xx, xx-yy, yy-yy, xy-xy, xx-xy, yy-xy.
+template <class Number, class Stress>
+std::array<std::array<Number, 4>, 4> tangent_with(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, const Stress& stress_of,
+                                                  bool rotates, bool geometric) {
     using std::sqrt;
     std::array<std::array<Number, 4>, 4> A;
     if (!rotates) {
@@ -105,9 +112,7 @@ std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>
     }
     if (geometric) {
         const Number e_xx = U_xx - 1.0, e_yy = U_yy - 1.0, shear = 2.0 * U_xy;
-        const Number s_xx = C[0] * e_xx + C[1] * e_yy + C[4] * shear;
-        const Number s_yy = C[1] * e_xx + C[2] * e_yy + C[5] * shear;
-        const Number s_xy = C[4] * e_xx + C[5] * e_yy + C[3] * shear;
+        const auto [s_xx, s_yy, s_xy] = stress_of(e_xx, e_yy, shear);
         const std::array<Number, 4> p = times_B(s_xx, s_yy, s_xy);
         const Number difference = r * (s_yy - s_xx);
         const Number twice = 2.0 * r * s_xy;
@@ -134,6 +139,17 @@ std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>
     for (int j = 0; j < 2; ++j)
         for (int i = 0; i < 4; ++i) turn(A[i][j], A[i][2 + j]);
     return A;
+}
+
+/// Second derivative of the energy of `elastic_state`.
+template <class Number>
+std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, bool rotates,
+                                                     bool geometric) {
+    const auto stress = [&](const Number& xx, const Number& yy, const Number& shear) {
+        return std::array<Number, 3>{C[0] * xx + C[1] * yy + C[4] * shear, C[1] * xx + C[2] * yy + C[5] * shear,
+                                     C[4] * xx + C[5] * yy + C[3] * shear};
+    };
+    return tangent_with(gradient, C, stress, rotates, geometric);
 }
 
 /// Gradient at a point of a field given at the nodes (a displacement or a velocity).

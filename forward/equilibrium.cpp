@@ -40,7 +40,9 @@ constexpr double least_strain = 1e-5;
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), gauges_(scene), internal_force_(body, materials, plan.rotates),
+      boundary_(scene, body, cracks_), gauges_(scene),
+      history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
+      internal_force_(body, materials, plan.rotates, history_.get()),
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
@@ -185,14 +187,9 @@ void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::
 // Points of a cell that follow each other on the same fields go together.
 template <class Visit>
 void Equilibrium::for_groups_of(int c, const Visit& visit) const {
-    const Points& points = body_.points;
-    int p = points.first_of_cell[c];
-    const int last = points.first_of_cell[c + 1];
-    while (p < last) {
-        const int first = p;
-        while (p < last && points.node.same(p, first)) ++p;
-        visit(points.node[first], first, p - first);
-    }
+    for_groups(body_.points, c, [&](const PointGroup& group) {
+        visit(std::as_const(body_.points).node[group.first], group.first, group.count);
+    });
 }
 
 // The same of the points.
@@ -374,6 +371,7 @@ void Equilibrium::learn(Eigen::VectorXd step, Eigen::VectorXd force) {
 
 Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
+    if (history_) history_->go_to(time);
     bool renew = true;
     double residual = 0.0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
@@ -429,7 +427,9 @@ double Equilibrium::traction_work() const {
     return work;
 }
 
-double Equilibrium::potential() const { return strain_energy() + contact_energy_ + face_energy_ - traction_work(); }
+double Equilibrium::potential() const {
+    return strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+}
 
 double Equilibrium::measured_displacement(double time) const {
     const Vec2 moved = boundary_.moved(gauges_.displacement, time, displacement_) + moved_[gauges_.displacement];
@@ -447,7 +447,9 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
     const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
-    return tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, face_forces()}, options);
+    TipLoad load = tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, face_forces()}, options);
+    if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
+    return load;
 }
 
 // Where points have come to other fields the factor is to be made anew, and where they share a node with such points.

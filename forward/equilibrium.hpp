@@ -10,6 +10,7 @@
 #include "forward/plan.hpp"
 
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,7 +20,8 @@ namespace crampfit {
 ///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions and forces on bodies
 /// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or closed
 /// crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi holds what
-/// friction has dissipated, so that its change is still the work of what prescribes motion.
+/// friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that remembers: an
+/// increment takes its history along, and Pi holds what it has dissipated.
 ///
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
@@ -40,11 +42,12 @@ class Equilibrium {
     const CrackFields& cracks() const { return cracks_; }
     const Boundary& boundary() const { return boundary_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
+    const History* history() const { return history_.get(); }  // null: no wood remembers
 
     double potential() const;                      // Pi [J]
     double strain_energy() const;                  // in the points and in the ties [J]
     double traction_work() const;                  // of tractions and forces on bodies, times displacement [J]
-    double dissipated() const;                     // by friction so far [J]
+    double dissipated() const;                     // by friction and in wood that remembers so far [J]
     double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
@@ -83,12 +86,13 @@ class Equilibrium {
     double release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope);
 
     /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what friction
-    /// remembers. Empty: as it was at the start.
+    /// and wood remember. Empty: as it was at the start.
     struct Contacts {
         std::vector<Vec2> moved;                // [drivers] [m]
         std::vector<std::vector<Grip>> bodies;  // [bodies that push]
         std::vector<Grip> faces;                // [pairs]
         std::vector<double> dissipated;         // by each of those bodies, and by all crack faces [J]
+        History::State history;                 // of wood that remembers
     };
     Contacts contacts() const;
 
@@ -157,6 +161,7 @@ class Equilibrium {
     CrackFields cracks_;
     Boundary boundary_;
     Gauges gauges_;
+    std::unique_ptr<History> history_;
     InternalForce internal_force_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;

@@ -179,6 +179,7 @@ std::vector<Vec2> Equilibrium::face_forces() const {
 
 // Friction counts from here on.
 void Equilibrium::settle() {
+    if (history_) history_->settle();
     for (std::size_t i = 0; i < sliding_.size(); ++i) sliding_[i].settle(place_of(sliding_driver_[i]), displacement_);
     if (settled_.empty()) return;
     std::vector<Grip> grips(cracks_.pairs.size());
@@ -194,20 +195,23 @@ void Equilibrium::settle() {
 double Equilibrium::dissipated() const {
     double sum = face_dissipated_;
     for (const SlidingBody& body : sliding_) sum += body.dissipated();
+    if (history_) sum += history_->dissipated();
     return sum;
 }
 
 Equilibrium::Contacts Equilibrium::contacts() const {
-    Contacts contacts{moved_, {}, face_grips_, {}};
+    Contacts contacts{moved_, {}, face_grips_, {}, {}};
     for (const SlidingBody& body : sliding_) {
         contacts.bodies.push_back(body.grips());
         contacts.dissipated.push_back(body.dissipated());
     }
     contacts.dissipated.push_back(face_dissipated_);
+    if (history_) contacts.history = history_->save();
     return contacts;
 }
 
 void Equilibrium::set_contacts(const Contacts& contacts) {
+    if (history_) history_->restore(contacts.history);
     const bool at_start = contacts.moved.empty();
     moved_ = at_start ? seat_ : contacts.moved;
     for (std::size_t i = 0; i < sliding_.size(); ++i)

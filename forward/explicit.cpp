@@ -18,7 +18,8 @@ constexpr double least_freed = -0.02;
 
 ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), internal_force_(body, materials, plan.rotates), team_(threads),
+      boundary_(scene, body, cracks_), history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
+      internal_force_(body, materials, plan.rotates, history_.get()), team_(threads),
       ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());
@@ -54,7 +55,7 @@ void ExplicitSolver::step() {
     advance_displacements(0.5 - lag());
     team_.pieces(cracks_.fields(), [&](int first, int last) { std::fill(force_.begin() + first, force_.begin() + last, Vec2::Zero()); });
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
-    internal_force_.add(displacement_, force_, team_);
+    inner_forces(time_ + (0.5 - lag()) * plan_.time_step);
     surface_forces();
     ties_.settle(cracks_, mass_, force_);
     ties_.pull(cracks_, displacement_, force_);
@@ -64,6 +65,13 @@ void ExplicitSolver::step() {
     carry_velocities();
     advance_displacements(0.5 + lag());
     time_ += plan_.time_step;
+}
+
+// Of the displacements as they are at a time.
+void ExplicitSolver::inner_forces(double time) {
+    if (history_) history_->go_to(time);
+    internal_force_.add(displacement_, force_, team_);
+    if (history_) history_->settle();
 }
 
 void ExplicitSolver::surface_forces() {
@@ -174,7 +182,9 @@ void ExplicitSolver::advance_displacements(double share) {
 TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
-    return tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, face_force_}, options);
+    TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, face_force_}, options);
+    if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
+    return load;
 }
 
 EnergyBooks ExplicitSolver::energies() const {
@@ -188,6 +198,7 @@ EnergyBooks ExplicitSolver::energies() const {
     books.kinetic = kinetic_energy();
     for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
     for (const SlidingBody& body : sliding_) books.damped += body.dissipated();
+    if (history_) books.damped += history_->dissipated();
     if (part_contact_) books.contact += part_contact_->stored_energy();
     return books;
 }

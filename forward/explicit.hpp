@@ -25,7 +25,7 @@ struct EnergyBooks {
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
     double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back
-    double damped = 0;    // by drag, and by friction and impact of contacts
+    double damped = 0;    // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
@@ -56,6 +56,7 @@ class ExplicitSolver {
     const CrackFields& cracks() const { return cracks_; }
     const std::vector<Vec2>& displacements() const { return displacement_; }
     const std::vector<Vec2>& velocities() const { return velocity_; }
+    const History* history() const { return history_.get(); }  // null: no wood remembers
 
     /// Force that an edge (first in the list) or a body puts on the specimen in the last step [N], and how far it has moved [m].
     const std::vector<Vec2>& reactions() const { return reaction_; }
@@ -85,6 +86,7 @@ class ExplicitSolver {
     Vec2 mean_velocity_of(int driver, double from, double to) const;
     Vec2 velocity_at_end_of_step(int driver) const;
 
+    void inner_forces(double time);
     void surface_forces();
     void advance_velocities();
     void carry_velocities();
@@ -102,6 +104,7 @@ class ExplicitSolver {
     Discretisation& body_;
     CrackFields cracks_;
     Boundary boundary_;
+    std::unique_ptr<History> history_;
     InternalForce internal_force_;
     mutable Team team_;
     TipTies ties_;

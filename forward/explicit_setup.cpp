@@ -63,7 +63,7 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     }
     for (const Boundary::Held& h : boundary_.held) velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
     std::fill(force_.begin(), force_.end(), Vec2::Zero());
-    internal_force_.add(displacement_, force_, team_);
+    inner_forces(0.0);
     carried_ = velocity_;
     for (std::size_t n = 0; n < mass_.size(); ++n) {
         if (mass_[n] == 0.0) continue;
@@ -77,7 +77,7 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     if (mapping_.is_used() && !mapping_.nodes_carry()) mapping_.hand_back(velocity_, {mass_, held_axes_, team_});
     books_ = {};
     const EnergyBooks at_start = energies();
-    books_.work = at_start.strain + at_start.kinetic;
+    books_.work = at_start.strain + at_start.kinetic + at_start.damped;
 }
 
 void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {

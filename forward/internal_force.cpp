@@ -6,8 +6,8 @@
 
 namespace crampfit {
 
-InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates)
-    : body_(body), rotates_(rotates), uneven_(body, materials, rotates), strips_(body.layout) {
+InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history)
+    : body_(body), rotates_(rotates), history_(history), uneven_(body, materials, rotates, history), strips_(body.layout) {
     sort_cells();
 }
 
@@ -17,11 +17,12 @@ void InternalForce::sort_cells() {
     whole_cells_.clear();
     loose_points_.clear();
     alone_.clear();
+    remembering_.clear();
     first_of_strip_.clear();
     uneven_.sort();
     for (int c = 0; c < layout.cells(); ++c) {
         if (c == strips_.first_cell(static_cast<int>(first_of_strip_.size())))
-            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
+            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
         const int first = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
         const auto alike = [&](int p) {
@@ -29,16 +30,18 @@ void InternalForce::sort_cells() {
             for (int q = first; q < last; ++q) count += points.node.same(p, q);
             return count;
         };
-        if (body_.cell_is_full(c) && alike(first) == last - first) {
+        const bool remembers = history_ && history_->is_in(c);
+        if (!remembers && body_.cell_is_full(c) && alike(first) == last - first) {
             whole_cells_.push_back(c);
         } else {
             for (int p = first; p < last; ++p) {
-                loose_points_.push_back(p);
+                if (!remembers) loose_points_.push_back(p);
                 if (layout.degree == 1 && alike(p) == 1) alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
             }
+            if (remembers) for_groups(points, c, [&](const PointGroup& group) { remembering_.push_back(group); });
         }
     }
-    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size()});
+    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
 }
 
 double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
@@ -188,9 +191,56 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     return sum;
 }
 
+// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what the
+// stress, shared as the strain is, puts on the change of B as it is.
+Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const {
+    using Slope = Eigen::Matrix<double, 3, 8>;
+    using Gradients = Eigen::Matrix<double, 4, 8>;
+    const SeenStrains seen(body_, *history_, group, displacement, rotates_);
+    std::array<Gradients, most_in_group> gradients;  // xx, xy, yx, yy by the nodes' displacements
+    std::array<Slope, most_in_group> slopes;
+    std::array<Eigen::Vector3d, most_in_group> stresses;
+    std::array<Eigen::Matrix3d, most_in_group> tangents;
+    for (int i = 0; i < group.count; ++i) {
+        const CellWeights& w = body_.weights[body_.points.slot[group.first + i]];
+        gradients[i].setZero();
+        for (int k = 0; k < 4; ++k)
+            for (int axis = 0; axis < 2; ++axis) gradients[i].block<2, 1>(2 * axis, 2 * k + axis) << w.slope_x[k], w.slope_y[k];
+        if (rotates_) {
+            const Polar polar(seen.gradient[i]);
+            Eigen::Matrix4d back = Eigen::Matrix4d::Zero();  // R^T dF of dF
+            for (int a = 0; a < 2; ++a)
+                for (int b = 0; b < 2; ++b) back.block<2, 2>(2 * a, 2 * b).diagonal().setConstant(polar.turn(b, a));
+            slopes[i] = polar.strain_slope() * back * gradients[i];
+        } else {
+            slopes[i] << gradients[i].row(0), gradients[i].row(3), gradients[i].row(1) + gradients[i].row(2);
+        }
+        const PlaneResponse response = history_->respond(group.first + i, seen.strain[i]);
+        stresses[i] = response.stress;
+        tangents[i] = response.tangent;
+    }
+    seen.share(slopes);
+    seen.share(stresses);
+    Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
+    for (int i = 0; i < group.count; ++i) {
+        const double volume = body_.points.volume[group.first + i];
+        sum += volume * slopes[i].transpose() * tangents[i] * slopes[i];
+        if (!rotates_ || !geometric) continue;
+        const Mat2& G = seen.gradient[i];
+        const auto stress = [&](double, double, double) { return std::array{stresses[i][0], stresses[i][1], stresses[i][2]}; };
+        const auto A = tangent_with<double>({G(0, 0), G(0, 1), G(1, 0), G(1, 1)}, {}, stress, true, true);
+        Eigen::Matrix4d turning;
+        for (int a = 0; a < 4; ++a)
+            for (int b = 0; b < 4; ++b) turning(a, b) = A[a][b];
+        sum += volume * gradients[i].transpose() * turning * gradients[i];
+    }
+    return sum;
+}
+
 Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
-    Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
     const int cell = body_.points.cell[first];
+    if (history_ && history_->is_in(cell)) return remembering_tangent({first, count}, displacement, geometric);
+    Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
     for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1))
         if (piece.point >= first && piece.point < first + count) sum += uneven_.tangent(piece, displacement, geometric);
     return sum;
@@ -207,6 +257,33 @@ Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int cou
     }
 }
 
+void InternalForce::add_stress(int p, const Mat2& stress, std::vector<Vec2>& force) const {
+    const CellWeights& w = body_.weights[body_.points.slot[p]];
+    const auto node = body_.points.node[p];
+    for (std::size_t k = 0; k < node.size(); ++k)
+        force[node[k]] -= body_.points.volume[p] * (stress * Vec2(w.slope_x[k], w.slope_y[k]));
+}
+
+double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+    double energy = 0.0;
+    for (const PointGroup& group : groups) {
+        const SeenStrains seen(body_, *history_, group, displacement, rotates_);
+        std::array<Eigen::Vector3d, most_in_group> stresses;
+        for (int i = 0; i < group.count; ++i) {
+            const int p = group.first + i;
+            if (force) stresses[i] = history_->respond(p, seen.strain[i]).stress;
+            else energy += body_.points.volume[p] * history_->stored(p, seen.strain[i]);
+        }
+        if (!force) continue;
+        seen.share(stresses);
+        for (int i = 0; i < group.count; ++i) {
+            const auto stress = [&](const Eigen::Vector3d&) { return stresses[i]; };
+            add_stress(group.first + i, state_with(seen.gradient[i], rotates_, stress).stress, *force);
+        }
+    }
+    return energy;
+}
+
 double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
     const Points& points = body_.points;
     const Place& from = first_of_strip_[strip];
@@ -217,17 +294,14 @@ double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, st
         const int p = loose_points_[i];
         const PointState state = elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
         energy += points.volume[p] * state.energy;
-        if (!force) continue;
-        const CellWeights& w = body_.weights[points.slot[p]];
-        const auto node = points.node[p];
-        for (std::size_t k = 0; k < node.size(); ++k)
-            (*force)[node[k]] -= points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k]));
+        if (force) add_stress(p, state.stress, *force);
     }
     for (const UnevenCells::Piece& piece : uneven_.pieces(strips_.first_cell(strip), strips_.first_cell(strip + 1))) {
         const UnevenCells::State state = uneven_.state(piece, *piece.wood, displacement);
         energy += state.energy;
         for (int k = 0; k < 4 && force; ++k) (*force)[points.node[piece.point][k]] -= state.force.segment<2>(2 * k);
     }
+    energy += visit_remembering({remembering_.data() + from.remembering, to.remembering - from.remembering}, displacement, force);
     for (std::size_t i = from.alone; i < to.alone; ++i) {
         const Alone& a = alone_[i];
         const Vec2 apart = crosswise(a.point, displacement);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "forward/seen_strain.hpp"
 #include "forward/strips.hpp"
 #include "forward/uneven_cells.hpp"
 
@@ -17,10 +18,13 @@ namespace crampfit {
 /// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
 /// u_2 + u_3|^2. A straight line among displacements does not feel it. (B-splines reach on into cells with more points.)
 ///
+/// Points that remember are taken apart from the others: they take a step of their history along.
+///
 /// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
   public:
-    InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates);
+    /// `history`: of the points that have one, null where none does.
+    InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history = nullptr);
 
     /// Call after points changed their fields.
     void sort_cells();
@@ -44,12 +48,12 @@ class InternalForce {
 
     const UnevenCells& uneven() const { return uneven_; }
 
-    /// Strain energy of all points [J].
+    /// Strain energy of all points; of those that remember as they were settled last [J].
     double energy(const std::vector<Vec2>& displacement) const;
 
   private:
     struct Place {  // in the lists below
-        std::size_t whole_cell, loose_point, alone;
+        std::size_t whole_cell, loose_point, alone, remembering;
     };
 
     // Adds the forces of a strip's points, or, without `force`, returns their strain energy [J].
@@ -60,14 +64,19 @@ class InternalForce {
     template <int Nodes, int PointsPerCell, bool Rotates>
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
+    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    void add_stress(int point, const Eigen::Matrix2d& stress, std::vector<Vec2>& force) const;
+    Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
     const Discretisation& body_;
     bool rotates_;
+    History* history_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
     std::vector<Alone> alone_;
+    std::vector<PointGroup> remembering_;
     UnevenCells uneven_;
     Strips strips_;
     std::vector<Place> first_of_strip_;  // [strips + 1]

@@ -11,7 +11,7 @@ namespace crampfit {
 
 KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, int threads)
     : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))), numbers_(numbers), threads_(threads) {
-    reusable_ = plan_.quasistatic && growing_tips(scene_) <= 1 && !plan_.friction;
+    reusable_ = plan_.quasistatic && growing_tips(scene_) <= 1 && !plan_.friction && !plan_.remembers;
     if (!has_slopes()) numbers_.clear();
 }
 

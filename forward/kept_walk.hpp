@@ -23,7 +23,7 @@ class KeptWalk {
     bool has_slopes() const { return reusable_ && !plan_.free_bodies; }
 
     /// False where toughness changes more than when the crack moves: in explicit dynamics, with several growing tips, or with
-    /// friction, where a state hangs on the way to it.
+    /// friction or wood that remembers, where a state hangs on the way to it.
     bool reusable() const { return reusable_; }
 
     /// Whether states are found by themselves. Else each is found from those found before, and depends on them by what Newton's

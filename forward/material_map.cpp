@@ -57,12 +57,14 @@ MaterialMap::MaterialMap(const Scene& scene) : scene_(scene) {
     }
     for (int k = 0; k < static_cast<int>(materials_.size()); ++k) pure_.push_back(mix(k, k, 0.0));
     orthotropic_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.orthotropic.has_value(); });
+    remembers_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.remembers(); });
+    const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
+    if (remembers_) check_memory(graded);
     if (!orthotropic_) return;
     check_radial_direction();
     if (plan.pith) homogeneous_ = false;
     if (plan.radial)
         for (LocalWood& wood : pure_) wood.elasticity.normal = {std::cos(*plan.radial), std::sin(*plan.radial)};
-    const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
     for (int k = 0; graded && k + 1 < static_cast<int>(materials_.size()); ++k) check_transition(k);
 }
 
@@ -87,6 +89,19 @@ void MaterialMap::check_transition(int first) const {
     }
 }
 
+void MaterialMap::check_memory(bool graded) const {
+    if (graded)
+        throw InputError(scene_.file.string(),
+                         scene_.specimen.rings ? "specimen.rings.transition" : scene_.specimen.picture ? "specimen.between" : "specimen.file",
+                         scene_.specimen.rings ? fmt::format("{:g} mm", scene_.specimen.rings->transition * 1e3) : "transition wood",
+                         "not available with viscoelastic or plastic wood: how such wood goes over into other wood is not known; leave the "
+                         "transition out, or give it a class and a material of its own");
+    for (const auto& [name, material] : scene_.materials)
+        if (orthotropic_ && material.orthotropic)
+            throw InputError(scene_.file.string(), "materials." + name + ".kind", "orthotropic",
+                             "not available beside viscoelastic or plastic wood; use \"isotropic\"");
+}
+
 LocalWood MaterialMap::mix(int first, int second, double grade) const {
     const Material material = first == second
                                   ? materials_[first]
@@ -102,6 +117,7 @@ LocalWood MaterialMap::mix(int first, int second, double grade) const {
         wood.poisson_ratios.setConstant(material.poisson_ratio);
     }
     wood.filled = 1.0;
+    wood.material = grade == 0.0 ? first : -1;
     const double last = std::max<double>(1.0, static_cast<double>(materials_.size()) - 1.0);
     wood.latewood = (first + grade * (second - first)) / last;
     return wood;
@@ -214,14 +230,35 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
 }
 
 // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
-int MaterialMap::samples_in(const Vec2& half) const {
-    return std::clamp(finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16, 2, 16);
+int MaterialMap::samples_a_side(const Vec2& half) const {
+    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
+    return std::clamp(fit, 2, 16);
+}
+
+std::vector<double> MaterialMap::shares(const Vec2& centre, const Vec2& half) const {
+    std::vector<double> shares(materials_.size(), 0.0);
+    const LocalWood* all = homogeneous_ ? &pure_[0] : band_around(centre, half);
+    if (all) {
+        shares[all->material] = 1.0;
+        return shares;
+    }
+    const int samples = samples_a_side(half);
+    double filled = 0.0;
+    for (int k = 0; k < samples * samples; ++k) {
+        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const LocalWood here = at(centre + place.cwiseProduct(half));
+        if (here.filled == 0.0) continue;
+        shares[here.material] += 1.0;
+        filled += 1.0;
+    }
+    for (double& share : shares) share /= std::max(1.0, filled);
+    return shares;
 }
 
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (homogeneous_) return pure_[0];
     if (const LocalWood* wood = band_around(centre, half)) return *wood;
-    const int samples = samples_in(half);
+    const int samples = samples_a_side(half);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
     double least = 1.0, most = 0.0;                 // latewood: layers lie as it does, whatever the moduli
@@ -260,7 +297,7 @@ Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const L
     const LocalWood* band = band_around(centre, half);
     if (homogeneous_ || average.filled < 1.0 || (band && band->elasticity.coefficients == average.elasticity.coefficients)) return {};
     using Coefficients = LayeredElasticity::Coefficients;
-    const int samples = samples_in(half);
+    const int samples = samples_a_side(half);
     const Vec2 normal = average.elasticity.normal;
     std::vector<Coefficients> wood;
     for (int k = 0; k < samples * samples; ++k) {

@@ -12,6 +12,7 @@ struct LocalWood {
     Vec2 poisson_ratios = Vec2::Zero();  // stress out of the plane, in plane strain, per stress along the normal and the layers
     double filled = 0;           // share of the area that is not void
     double latewood = 0;         // 0 first material .. 1 last, for pictures
+    int material = -1;           // its number; -1: transition wood, or an average
 
     /// E' = E in plane stress, E / (1 - nu^2) in plane strain, along the layers [Pa].
     double plane_modulus() const { return elasticity.coefficients[0]; }
@@ -33,7 +34,8 @@ struct Unevenness {
 /// layers across its radial direction.
 class MaterialMap {
   public:
-    /// Throws InputError for orthotropic wood without a radial direction, and for transition wood with inadmissible constants.
+    /// Throws InputError for orthotropic wood without a radial direction, for transition wood with inadmissible constants, and for wood
+    /// that remembers where there is transition or orthotropic wood.
     explicit MaterialMap(const Scene& scene);
 
     /// At a place. Outside a picture the nearest pixel counts, so that rounding at the edge costs no points.
@@ -51,13 +53,20 @@ class MaterialMap {
 
     bool homogeneous() const { return homogeneous_; }
     bool orthotropic() const { return orthotropic_; }  // some of it
+    bool remembers() const { return remembers_; }      // some of it
+
+    const std::vector<Material>& materials() const { return materials_; }  // by number
+
+    /// What part of the wood in an upright rectangle each material is, by number.
+    std::vector<double> shares(const Vec2& centre, const Vec2& half) const;
 
   private:
     LocalWood mix(int first, int second, double grade) const;
     void check_radial_direction() const;
     void check_transition(int first) const;
+    void check_memory(bool graded) const;
+    int samples_a_side(const Vec2& half) const;
     Vec2 radial_direction(const Vec2& x) const;
-    int samples_in(const Vec2& half) const;
     Vec2 layer_normal(const Vec2& centre, const Vec2& half) const;
     void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                             LayeredElasticity& mean) const;
@@ -75,6 +84,7 @@ class MaterialMap {
     double finest_ = 0.0;                       // size of the finest detail to average over [m]; 0: none
     bool homogeneous_ = true;
     bool orthotropic_ = false;
+    bool remembers_ = false;
 };
 
 } // namespace crampfit

@@ -1,6 +1,9 @@
 #include "forward/plan.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/history.hpp"
+#include "forward/march.hpp"
+#include "forward/memory_check.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
@@ -218,6 +221,21 @@ void choose_updates(const Scene& scene, Plan& plan) {
                                 "asked for in solver.stress_update"});
 }
 
+void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials, const Discretisation& body) {
+    if (!plan.remembers) {
+        plan.choices.push_back({"history", "none", "all wood is elastic"});
+        return;
+    }
+    std::string kinds;
+    for (const auto& [name, material] : scene.materials)
+        if (material.remembers()) kinds += fmt::format("{}{} is {}", kinds.empty() ? "" : ", ", name, material.plastic ? "plastic" : "viscoelastic");
+    const History history(materials, body, scene.model.plane);
+    plan.choices.push_back({"history", fmt::format("in {} of {} cells, {:.3g} MB", history.cells(), body.layout.cells(), static_cast<double>(history.bytes()) * 1e-6),
+                            kinds + "; woods that share a cell act as layers, each with a memory of its own"});
+    plan.choices.push_back({"dissipation", "beside the strain energy, which is what comes back",
+                            "external work = strain + kinetic + fracture energy + what wood, damping and friction dissipate"});
+}
+
 } // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -246,6 +264,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                        (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
                         (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
+    plan.remembers = materials.remembers();
+    check_memory(scene, plan.quasistatic, materials, body);
 
     const double smallest = scene.specimen.size.minCoeff();
     const double motion = farthest_motion(scene, plan.end_time);
@@ -255,15 +275,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const double needed = plan.quasistatic && plan.grows && scene.bodies.empty() ? splitting_motion(scene, body) : motion;
     const double expected = std::min(motion, needed);
     plan.rotates = expected > most_rotation * smallest;
-    plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && travel.together;
-    if (plan.quasistatic && !plan.linear && plan.driven && !std::isfinite(plan.end_time))
+    plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && !plan.remembers && travel.together;
+    if (plan.quasistatic && !plan.linear && (plan.driven || plan.remembers) && !std::isfinite(plan.end_time))
         refuse(scene, "stop", "crack_length alone", "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
         : starts_in_motion(scene) ? "a part starts in motion"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
-    if (plan.quasistatic) choose("solver", plan.linear ? "equilibrium, linear" : "equilibrium, Newton's method", why);
+    if (plan.quasistatic)
+        choose("solver", plan.linear ? "equilibrium, linear" : plan.remembers ? "equilibrium in steps of time, Newton's method" : "equilibrium, Newton's method", why);
     else choose("solver", "explicit dynamics", why);
     double least_advance = std::numeric_limits<double>::infinity();
     for (const Crack& crack : scene.cracks)
@@ -271,10 +292,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const bool fine_enough = std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells &&
                              least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
     const bool may_meet = plan.grows && scene.cracks.size() > 1;
-    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet;
+    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
+               : plan.remembers        ? "wood that remembers: errors of time and of the grid do not go together"
                : may_meet              ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
                : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
                                           : "solver.extrapolate is false");
@@ -291,15 +313,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const std::string kind = materials.orthotropic() ? "orthotropic" : "isotropic";
     choose("material", materials.homogeneous() ? "one " + kind + " material" : kind + " wood by place; points that a boundary crosses act as layers",
            !materials.homogeneous()  ? "band widths do not round to points; J carries the material-gradient term"
-           : materials.orthotropic() ? "one radial direction, no history"
-                                     : "no orientation, no history");
+           : materials.orthotropic() ? "one radial direction"
+                                     : "no orientation");
+    choose_history(scene, plan, materials, body);
 
     if (scene.cracks.empty()) choose("crack fields", "none", "no crack");
     else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
                 std::string("two fields at nodes whose support a crack cuts, ") +
                     (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere");
     if (!scene.cracks.empty())
-        choose("J, K", !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "at saved instants and where a crack turns; it grows by the energy that the ties at its tip give up", "domain form, 4 cells around the tip");
+        choose("J, K", plan.remembers ? "at saved instants; not a number where wood within 5.5 cells of the tip remembers" : !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "at saved instants and where a crack turns; it grows by the energy that the ties at its tip give up", "domain form, 4 cells around the tip");
     const int tips = growing_tips(scene);
     if (plan.quasistatic && tips > 1)
         choose("growth", fmt::format("{} tips compete", tips),
@@ -338,7 +361,8 @@ std::string describe(const Scene& scene, const Plan& plan, const Discretisation&
                         body.layout.nodes());
     if (plan.quasistatic) {
         const double seconds = body.layout.nodes() * seconds_per_node * std::sqrt(static_cast<double>(body.layout.nodes()));
-        text += fmt::format("{:<15} about {:.2g} s on one core for an equilibrium\n", "cost", seconds);
+        text += fmt::format("{:<15} about {:.2g} s on one core for an equilibrium{}\n", "cost", seconds,
+                            plan.remembers ? fmt::format(", of which there are {} or more in time", march_times(scene, plan, MaterialMap(scene)).size()) : "");
         return text;
     }
     text += fmt::format("{:<15} {:.4g} us\n", "time step", plan.time_step * 1e6);

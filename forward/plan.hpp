@@ -18,6 +18,7 @@ struct Plan {
     bool grows = false;         // some tip may grow
     bool contact = false;       // some body can touch and slide
     bool friction = false;      // some body or closed crack faces rub: a state hangs on the way to it
+    bool remembers = false;     // some wood is viscoelastic or plastic: a state hangs on the way to it
     bool free_bodies = false;   // some body follows a force
     double time_step = 0;       // [s]
     double added_frequency_squared = 0;  // what contact and ties may add to the highest squared frequency [1/s^2]

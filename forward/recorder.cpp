@@ -1,25 +1,42 @@
 #include "forward/recorder.hpp"
 
 #include "forward/probes.hpp"
+#include "forward/seen_strain.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace crampfit {
 
-Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement) {
+Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement,
+                 const History* history) {
     Frame frame;
     const Points& points = body.points;
-    for (int p = 0; p < points.count(); ++p) {
-        const PointState state = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates);
-        const double xx = state.stress(0, 0);
-        const double yy = state.stress(1, 1);
-        const double xy = 0.5 * (state.stress(0, 1) + state.stress(1, 0));
-        double zz = 0.0;
-        if (scene.model.plane == PlaneCondition::strain)
-            zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy) : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
+    const bool plane_strain = scene.model.plane == PlaneCondition::strain;
+    const auto add = [&](int p, const Mat2& stress, double zz) {
         frame.moved.push_back(value_at(body, p, displacement).cast<float>());
-        frame.stress.push_back(Eigen::Vector4d(xx, yy, xy, zz).cast<float>());
+        frame.stress.push_back(Eigen::Vector4d(stress(0, 0), stress(1, 1), 0.5 * (stress(0, 1) + stress(1, 0)), zz).cast<float>());
+    };
+    for (int c = 0; c < body.layout.cells(); ++c) {
+        for_groups(points, c, [&](const PointGroup& group) {
+            if (history && history->is_in(c)) {
+                const SeenStrains seen(body, *history, group, displacement, plan.rotates);
+                for (int i = 0; i < group.count; ++i) {
+                    const Tensor s = history->stress(group.first + i, seen.strain[i]);
+                    const auto stress = [&](const Eigen::Vector3d&) { return Eigen::Vector3d(s[0], s[1], s[3]); };
+                    add(group.first + i, state_with(seen.gradient[i], plan.rotates, stress).stress, s[2]);
+                }
+                return;
+            }
+            for (int p = group.first; p < group.first + group.count; ++p) {
+                const Mat2 stress = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates).stress;
+                const double xx = stress(0, 0), yy = stress(1, 1), xy = 0.5 * (stress(0, 1) + stress(1, 0));
+                double zz = 0.0;
+                if (plane_strain)
+                    zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy) : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
+                add(p, stress, zz);
+            }
+        });
     }
     return frame;
 }
@@ -168,7 +185,7 @@ void Recorder::read_probes_now() {
 
 void Recorder::save_frame() {
     ++frames_saved_;
-    record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements()));
+    record_.frames.push_back(make_frame(scene_, plan_, body_, solver_.displacements(), solver_.history()));
     Frame& frame = record_.frames.back();
     frame.time = solver_.time();
     frame.displacement = now().displacement;

@@ -6,7 +6,9 @@
 namespace crampfit {
 
 /// The points with this displacement; when that is and the crack are the caller's.
-Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement);
+/// `history`: of the points that have one, as it was settled with this displacement.
+Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement,
+                 const History* history = nullptr);
 
 /// The tip whose length, place, G and K the series holds: of the first crack that grows, or of the first.
 struct TrackedTip {

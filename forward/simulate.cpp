@@ -2,6 +2,7 @@
 
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
+#include "forward/march.hpp"
 #include "forward/probes.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/recorder.hpp"
@@ -65,6 +66,18 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
         frame.displacement = instant.displacement;
         if (tracked.crack >= 0) frame.crack = revisit.equilibrium().cracks().lines[tracked.crack].points;
     }
+}
+
+Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, const SimulateOptions& options) {
+    long step = 0;
+    double crack_length = 0.0;  // it stands
+    if (const int crack = tracked_tip(scene).crack; crack >= 0)
+        for (std::size_t k = 0; k + 1 < scene.cracks[crack].points.size(); ++k)
+            crack_length += (scene.cracks[crack].points[k + 1] - scene.cracks[crack].points[k]).norm();
+    return march(scene, plan, materials, body, options.threads, [&](double time) {
+        if (options.progress) options.progress({std::clamp(time / plan.end_time, 0.0, 1.0), time, crack_length, step++});
+        return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
+    });
 }
 
 Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const SimulateOptions& options) {
@@ -137,8 +150,9 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
     const Plan plan = make_plan(scene, materials, body);
-    Record record = plan.quasistatic ? run_quasistatic(scene, plan, materials, options)
-                                     : run_explicit(scene, plan, materials, body, options);
+    Record record = !plan.quasistatic ? run_explicit(scene, plan, materials, body, options)
+                    : plan.remembers  ? run_in_time(scene, plan, materials, body, options)
+                                      : run_quasistatic(scene, plan, materials, options);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);
     if (!plan.quasistatic) record.explanation += fmt::format("{:<15} kinetic energy up to {:.2g} times the strain energy\n", "motion", kinetic_share(record));

@@ -5,8 +5,8 @@
 
 namespace crampfit {
 
-UnevenCells::UnevenCells(const Discretisation& body, const MaterialMap& materials, bool rotates)
-    : body_(body), materials_(materials), rotates_(rotates) {
+UnevenCells::UnevenCells(const Discretisation& body, const MaterialMap& materials, bool rotates, const History* history)
+    : body_(body), materials_(materials), rotates_(rotates), history_(history) {
     sort();
 }
 
@@ -24,6 +24,7 @@ void UnevenCells::sort() {
     pieces_.clear();
     std::vector<bool> taken(side * side);
     for (const Discretisation::UnevenCell& cell : body_.uneven_cells) {
+        if (history_ && history_->is_in(cell.cell)) continue;
         const int first = points.first_of_cell[cell.cell];
         std::fill(taken.begin(), taken.end(), false);
         for (int start = 0; start < side * side; ++start) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/deformation.hpp"
+#include "forward/history.hpp"
 
 #include <map>
 #include <span>
@@ -15,8 +16,8 @@ namespace crampfit {
 /// e . S e / 2 + e . G d + d . H d / 2.
 class UnevenCells {
   public:
-    /// `body` and `materials` must outlive this.
-    UnevenCells(const Discretisation& body, const MaterialMap& materials, bool rotates);
+    /// All must outlive this. Cells with a `history` have laws of their own; null: none has.
+    UnevenCells(const Discretisation& body, const MaterialMap& materials, bool rotates, const History* history);
 
     /// Call after points changed their fields.
     void sort();
@@ -48,6 +49,7 @@ class UnevenCells {
     const Discretisation& body_;
     const MaterialMap& materials_;
     bool rotates_;
+    const History* history_;
     std::vector<Piece> pieces_;                           // by cell
     std::map<std::pair<int, PointBox>, Unevenness> cut_;  // of pieces of cells, as they were met
 };

@@ -30,7 +30,7 @@ class Mutator {
     std::size_t below(std::size_t end) { return random_() % end; }
 
     const std::string& scene() {
-        const std::array<const std::string*, 3> scenes{&ring_scene, &picture_scene, &plain_scene};
+        const std::array<const std::string*, 4> scenes{&ring_scene, &picture_scene, &plain_scene, &remembering_scene};
         return *scenes[below(scenes.size())];
     }
 

@@ -181,3 +181,42 @@ traction = ["0 MPa", "1 MPa"]
 [stop]
 time = "1 ms"
 )";
+
+inline const std::string remembering_scene = R"([model]
+plane = "stress"
+thickness = "10 mm"
+cell = "0.2 mm"
+
+[specimen]
+size = ["10 mm", "10 mm"]
+rings = { pith = ["-20 mm", "5 mm"], period = "2.2 mm", latewood_fraction = 0.25, transition = "0 mm" }
+
+[materials.EW]
+kind = "viscoelastic"
+E = "40 MPa"
+nu = 0.33
+prony = [ { g = 0.2, tau = "1 s" }, { g = 0.3, k = 0.1, tau = "2 min" } ]
+density = "300 kg/m^3"
+toughness = "100 J/m^2"
+
+[materials.LW]
+kind = "plastic"
+E = "1200 MPa"
+nu = 0.3
+yield_stress = "2 MPa"
+hardening = "5 MPa"
+saturation_stress = "3 MPa"
+saturation_strain = 0.02
+density = "900 kg/m^3"
+toughness = "300 J/m^2"
+
+[[edges]]
+side = "top"
+traction = ["0 MPa", "1 MPa"]
+
+[solver]
+time_step = "2 s"
+
+[stop]
+time = "1 min"
+)";

@@ -520,8 +520,58 @@ TEST(UnitScene, NotSupportedYet) {
         {ring_scene, "cell = \"0.1 mm\"", "cell = \"0.1 mm\"\nerror = \"2 %\"", "model.error", "either"},
         {ring_scene, "cell = \"0.1 mm\"", "error = \"0 %\"", "model.error", "between"},
         {ring_scene, "cell = \"0.1 mm\"", "error = \"2 mm\"", "model.error", ""},
-        {ring_scene, "\"isotropic\"", "\"viscoelastic\"", "materials.EW.kind", "not supported yet"},
-        {ring_scene, "\"isotropic\"", "\"plastic\"", "materials.EW.kind", "not supported yet"},
+    });
+}
+
+TEST(UnitScene, WoodThatRemembers) {
+    const SceneFolder folder;
+    Scene scene = folder.parse(remembering_scene);
+    EXPECT_DOUBLE_EQ(*scene.solver.time_step, 2.0);
+    const Material& viscoelastic = scene.materials.at("EW");
+    ASSERT_TRUE(viscoelastic.viscoelastic && !viscoelastic.plastic && scene.materials.at("LW").remembers());
+    ASSERT_EQ(viscoelastic.viscoelastic->prony.size(), 2U);
+    EXPECT_EQ(viscoelastic.viscoelastic->prony[0].k, 0.0);
+    EXPECT_EQ(viscoelastic.viscoelastic->prony[1].k, 0.1);
+    EXPECT_DOUBLE_EQ(viscoelastic.viscoelastic->prony[1].tau, 120.0);
+    // A fit may adjust them, within the rules for all together.
+    set_number(scene, "materials.EW.prony.1.tau", 60.0);
+    set_number(scene, "materials.EW.prony.0.g", 0.25);
+    EXPECT_DOUBLE_EQ(get_number(scene, "materials.EW.prony.1.tau"), 60.0);
+    EXPECT_THROW(set_number(scene, "materials.EW.prony.0.g", 0.75), InputError);
+    EXPECT_DOUBLE_EQ(scene.materials.at("EW").viscoelastic->prony[0].g, 0.25);
+    for (const char* key : {"prony", "prony.2.g", "prony.0", "prony.0.h", "prony.0.g.x", "yield_stress"})
+        EXPECT_THROW(set_number(scene, std::string("materials.EW.") + key, 0.1), InputError) << key;
+
+    const Plasticity& plastic = *scene.materials.at("LW").plastic;
+    EXPECT_EQ(plastic.yield_stress, 2e6);
+    EXPECT_EQ(plastic.hardening, 5e6);
+    EXPECT_EQ(plastic.saturation->stress, 3e6);
+    EXPECT_EQ(plastic.saturation->strain, 0.02);
+    set_number(scene, "materials.LW.yield_stress", 2.5e6);
+    EXPECT_THROW(set_number(scene, "materials.LW.yield_stress", 3.5e6), InputError);  // above the saturation stress
+    EXPECT_EQ(scene.materials.at("LW").plastic->yield_stress, 2.5e6);
+    EXPECT_EQ(folder.parse(replaced(remembering_scene, "hardening = \"5 MPa\"\n", "")).materials.at("LW").plastic->hardening, 0.0);
+
+    const std::string& all = remembering_scene;
+    expect_errors({
+        {all, "g = 0.2", "g = 0.8", "materials.EW.prony", "below 1"},
+        {all, "g = 0.2", "g = 1.2", "materials.EW.prony.0.g", "between 0 and 1"},
+        {all, "g = 0.2", "g = \"0.2 MPa\"", "materials.EW.prony.0.g", ""},
+        {all, "g = 0.2, tau", "tau", "materials.EW.prony.0.g", "missing"},
+        {all, "\"1 s\"", "\"0 s\"", "materials.EW.prony.0.tau", "greater than 0"},
+        {all, "\"1 s\"", "1", "materials.EW.prony.0.tau", ""},
+        {all, ", tau = \"1 s\"", "", "materials.EW.prony.0.tau", "missing"},
+        {all, "g = 0.2,", "g = 0.2, G = 0.1,", "materials.EW.prony.0.G", ""},
+        {all, "prony = [ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "", "materials.EW.prony", "missing"},
+        {all, "[ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "[]", "materials.EW.prony", "at least one"},
+        {all, "prony =", "yield_stress = \"1 MPa\"\nprony =", "materials.EW.yield_stress", ""},
+        {all, "\"2 MPa\"", "\"-2 MPa\"", "materials.LW.yield_stress", "greater than 0"},
+        {all, "yield_stress = \"2 MPa\"\n", "", "materials.LW.yield_stress", "missing"},
+        {all, "\"5 MPa\"", "\"-5 MPa\"", "materials.LW.hardening", "negative"},
+        {all, "\"3 MPa\"", "\"1 MPa\"", "materials.LW.saturation_stress", "yield_stress"},
+        {all, "\nsaturation_strain = 0.02", "", "materials.LW.saturation_strain", "missing"},
+        {all, "strain = 0.02", "strain = 0", "materials.LW.saturation_strain", "greater than 0"},
+        {all, "saturation_strain", "saturation_strian", "materials.LW.saturation_strian", "did you mean"},
     });
 }
 

@@ -307,8 +307,8 @@ Scene edge_crack(double cell) {
 TEST(VerificationOrthotropicCrack, EqualConstantsRunAsIsotropicWood) {
     Scene scene = edge_crack(0.5e-3);
     const TipLoad isotropic = AtRest(scene).load();
-    const auto [E, nu, rho, toughness, none] = earlywood();
-    scene.materials["EW"] = {0.0, 0.0, rho, toughness, OrthotropicElasticity{E, E, 0.5 * E / (1 + nu), nu, E, nu, nu}};
+    const double E = earlywood().youngs_modulus, nu = earlywood().poisson_ratio;
+    scene.materials["EW"] = {0.0, 0.0, earlywood().density, earlywood().toughness, OrthotropicElasticity{E, E, 0.5 * E / (1 + nu), nu, E, nu, nu}};
     for (const double radial : {0.0, 0.6}) {
         scene.specimen.radial = radial;
         const TipLoad same = AtRest(scene).load();
