@@ -1,6 +1,7 @@
 #include "inverse/walk_descent.hpp"
 
 #include "inverse/minimize.hpp"
+#include "inverse/window.hpp"
 
 #include <Eigen/Cholesky>
 
@@ -19,23 +20,12 @@ constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
 
 constexpr int points_a_parameter = 12;  // of a spread
-constexpr int model_descents = 2;
+constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
+constexpr int model_descents = 4;    // from the lowest of them
 constexpr int runs_across_kinks = 120;
 constexpr int most_polishing_steps = 15;
 constexpr double polishing_difference = 1e-5;
 constexpr int most_cheap_runs = 100000;
-
-// What lies within a radius of a centre along each axis, as a unit cube.
-struct Window {
-    Eigen::VectorXd low, high;
-
-    Window(const Eigen::VectorXd& centre, double radius)
-        : low((centre.array() - radius).cwiseMax(0.0)), high((centre.array() + radius).cwiseMin(1.0)) {}
-    Eigen::VectorXd inside(const Eigen::VectorXd& y) const { return low + y.cwiseProduct(high - low); }
-    Eigen::VectorXd share(const Eigen::VectorXd& x) const {
-        return (x - low).cwiseQuotient((high - low).cwiseMax(1e-300)).cwiseMax(0.0).cwiseMin(1.0);
-    }
-};
 
 // Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
 void polish(Objective& cheap, Eigen::VectorXd y) {
@@ -80,11 +70,10 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
 
 // The lowest point of the model in the window.
 Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
-    const int model_starts = 2 * static_cast<int>(centre.size()) + 2;
     Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
                     most_cheap_runs, objective.threads(), objective.stop());
     std::vector<Eigen::VectorXd> starts{window.share(centre)};
-    for (int i = 1; i < model_starts; ++i) {
+    for (int i = 1; i < model_starts * static_cast<int>(centre.size()); ++i) {
         starts.push_back(halton(i, centre.size(), seed));
     }
     cheap.at(starts);
@@ -148,6 +137,11 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
 }
 
 }  // namespace
+
+bool descend_again(Objective& objective, const Near& near, const Near& rough, unsigned seed) {
+    const Eigen::VectorXd start = objective.best()->x;
+    return descend_from(objective, near, rough, start, seed);
+}
 
 SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
                               unsigned seed, const std::function<void(const std::string&)>& stage) {

@@ -19,6 +19,9 @@ using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
                               unsigned seed, const std::function<void(const std::string&)>& stage);
 
+/// One more such descent, from the best run, after runs have been weighed anew. Whether it ended by its own criterion.
+bool descend_again(Objective& objective, const Near& near, const Near& rough, unsigned seed);
+
 /// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.
 void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed);
 

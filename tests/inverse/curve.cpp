@@ -10,12 +10,15 @@ namespace {
 
 const double nan_ = std::nan("");
 
-TEST(UnitCurve, SortsRowsSkipsGapsAndAveragesEqualPlaces) {
+TEST(UnitCurve, SortsRowsSkipsGapsAndStepsAtEqualPlaces) {
     const std::vector<double> x{2, 0, 1, 1, 3, nan_, 4};
     const std::vector<double> y{20, 0, 8, 12, nan_, 7, 40};
     const Curve curve(x, y);
-    EXPECT_EQ(curve.x(), (std::vector<double>{0, 1, 2, 4}));
-    EXPECT_EQ(curve.y(), (std::vector<double>{0, 10, 20, 40}));
+    EXPECT_EQ(curve.x(), (std::vector<double>{0, 1, std::nextafter(1.0, 2.0), 2, 4}));
+    EXPECT_EQ(curve.y(), (std::vector<double>{0, 8, 12, 20, 40}));
+    EXPECT_NEAR(curve.mean(0, 2), 0.5 * (0.5 * 8 + 0.5 * (12 + 20)), 1e-14);
+    const Curve many(std::vector<double>{0, 1, 1, 1, 2}, std::vector<double>{0, 1, 2, 6, 0});
+    EXPECT_EQ(many.y(), (std::vector<double>{0, 1.5, 4, 0}));
 }
 
 TEST(UnitCurve, InterpolatesAndContinuesItsEnds) {
