@@ -54,6 +54,22 @@ TEST(UnitCurve, SmoothingKeepsAStraightLineUpToItsEnds) {
     }
 }
 
+// A test that ends with a jump has its last two rows at one displacement.
+TEST(UnitCurve, SmoothingLeavesAStepAtTheEnd) {
+    std::vector<double> x, y;
+    for (int i = 0; i <= 1000; ++i) {
+        x.push_back(0.9366060300e-6 * i);
+        y.push_back(1.1e-3 + 0.6e-6 * i);
+    }
+    x.push_back(x.back());
+    y.push_back(3.9e-3);
+    const Curve smooth = Curve(x, y).smoothed(2e-5);
+    for (std::size_t i = 1; i < smooth.y().size(); ++i) {
+        EXPECT_GE(smooth.y()[i], smooth.y()[i - 1]);
+    }
+    EXPECT_DOUBLE_EQ(smooth.y().back(), 3.9e-3);
+}
+
 TEST(UnitCurve, SmoothingTakesOutAVibrationOfItsOwnPeriod) {
     std::vector<double> x, y;
     for (int i = 0; i <= 1000; ++i) {
