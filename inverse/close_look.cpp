@@ -1,21 +1,76 @@
 #include "inverse/close_look.hpp"
 
 #include "inverse/differences.hpp"
+#include "inverse/profile.hpp"
 #include "inverse/walk_descent.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace crampfit {
 namespace {
 
-constexpr double first_widths[] = {1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001};  // half widths, of the box
-constexpr double errors_wide = 12;          // half width in standard errors: a difference is three quarters of one
-constexpr double agreement = 1.4;           // of a window with the errors that it finds
-constexpr double least_width = 1e-5;        // of the box
+constexpr double first_distance = 1e-5;  // of the box
+constexpr double rise = 9;               // of the misfit, in what the noise explains: three standard errors, the others held
+constexpr double room = 3;               // for correlation, and from one window to a wider one
+constexpr double errors_wide = 12;       // half width in standard errors: a difference is three quarters of one
+constexpr double agreement = 1.4;        // of a window with the errors that it finds
 constexpr int most_rounds = 6;
 
-bool all_told(const Uncertainty& u) { return ((u.upper_95 - u.lower_95).array() < 1.0).all(); }
+bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
+
+bool is_whole(const Window& window) { return window.width().minCoeff() >= 1.0; }
+
+// As far along each axis, either way, as the misfit needs to rise.
+Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::VectorXd& x) {
+    const Evaluation here = near(x, 1);
+    const double noise = std::max(1.0, here.misfit / static_cast<double>(std::max<Eigen::Index>(1, here.residuals.size() - x.size())));
+    const auto distance = [&](Eigen::Index j, double side) {
+        double d = first_distance;
+        for (; d < 1.0; d *= 2) {
+            Eigen::VectorXd at = x;
+            at[j] = std::clamp(x[j] + side * d, 0.0, 1.0);
+            const Evaluation there = near(at, 1);
+            if (!there.usable() || there.misfit - here.misfit > rise * noise) {
+                break;
+            }
+        }
+        return d;
+    };
+    Eigen::VectorXd below(x.size()), above(x.size());
+    for (Eigen::Index j = 0; j < x.size(); ++j) {
+        below[j] = room * distance(j, -1);
+        above[j] = room * distance(j, 1);
+    }
+    return {x, below, above};
+}
+
+Window wider(const Window& window, const Eigen::VectorXd& x) { return {x, room * (x - window.low), room * (window.high - x)}; }
+
+// Puts the profile's intervals in the place of those that a parabola does not give. False where one of them does not end.
+bool take_profile(CloseLook& look) {
+    Uncertainty& u = look.uncertainty;
+    const double level = u.quantile * u.quantile * u.widening;
+    Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
+    for (Eigen::Index j = 0; j < lower.size(); ++j) {
+        constexpr double step_of = 0.1;  // of the window, twice that of the profile
+        const Profile profile = profile_likelihood(look.objective, u.best, j, step_of, level);
+        const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
+        lower[j] = ends.first;
+        upper[j] = ends.second;
+    }
+    if (lower.minCoeff() <= 0.0 || upper.maxCoeff() >= 1.0) {
+        return false;
+    }
+    u.lower_95 = lower;
+    u.upper_95 = upper;
+    u.covariance = ((upper - lower) / (2 * u.quantile)).cwiseAbs2().asDiagonal();
+    u.message.erase(u.message.find(u.untold), u.untold.size());
+    u.untold.clear();
+    u.message += "The misfit is no parabola about its lowest point: the intervals are those of the profile likelihood. ";
+    return true;
+}
 
 }  // namespace
 
@@ -41,16 +96,17 @@ CloseLook look_close(const Objective& objective, const Objective::Evaluate& near
         here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step);
         return here;
     };
-    CloseLook found = look(Window(x, first_widths[0]));
-    for (std::size_t i = 1; i < std::size(first_widths) && !all_told(found.uncertainty) && !objective.stopped(); ++i) {
-        CloseLook narrower = look(Window(x, first_widths[i]));
-        if (all_told(narrower.uncertainty)) {
-            found = std::move(narrower);
-        }
+    CloseLook first = look(as_wide_as_the_misfit_says(near, x));
+    CloseLook found = first;
+    while (!all_told(found.uncertainty) && !is_whole(found.window) && !objective.stopped()) {
+        found = look(wider(found.window, x));
     }
-    for (int round = 0; round < most_rounds && all_told(found.uncertainty) && !objective.stopped(); ++round) {
-        const Eigen::VectorXd half = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());
-        const Window wanted(x, (errors_wide * half).cwiseMax(least_width));
+    if (!all_told(found.uncertainty)) {
+        return take_profile(first) ? first : found;
+    }
+    for (int round = 0; round < most_rounds && !objective.stopped(); ++round) {
+        const Eigen::VectorXd errors = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());
+        const Window wanted(x, errors_wide * errors);
         const Eigen::VectorXd ratio = wanted.width().cwiseQuotient(found.window.width());
         if (ratio.maxCoeff() < agreement && ratio.minCoeff() > 1 / agreement) {
             break;

@@ -18,10 +18,11 @@ struct CloseLook {
     Uncertainty in_box() const;  // of the whole unit cube
 };
 
-/// Intervals about a point x [parameters] where runs nearby, `near`, are cheap. The window is so many standard errors wide that its
+/// Intervals about a point x [parameters] where runs nearby, `near`, are cheap. The window is as wide as the misfit says, so that its
 /// differences span what the intervals do: a curve with jumps has kinks that a derivative at a point does not see, and wide
-/// differences are blunt where the data are sharp. Where a wide window hides a slope, a narrower one finds it. `objective` says how
-/// many threads there are and when to stop; `curve_lengths` and `names` as in `estimate_uncertainty`.
+/// differences are blunt where the data are sharp. Where the misfit is no parabola there, as at the edge of a jump, the intervals are
+/// those of the profile likelihood; where that does not end either, the parameters cannot be told. `objective` says how many threads
+/// there are and when to stop; `curve_lengths` and `names` as in `estimate_uncertainty`.
 CloseLook look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
                      const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed);
 

@@ -13,6 +13,7 @@ constexpr int most_steps = 24;            // on a side
 constexpr double least_step = 0.002;      // of the box: below it, a run's own noise is all there is
 constexpr double largest_step = 0.1;      // of the box
 constexpr int runs_of_a_descent = 60;
+constexpr int runs_across_kinks = 30;
 
 // x with its coordinate j left out, or put in.
 Eigen::VectorXd without(const Eigen::VectorXd& x, Eigen::Index j) {
@@ -39,6 +40,11 @@ std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& star
             },
             runs_of_a_descent, 1);
         minimize_with_ceres(others, without(start, j));
+        if (others.best()) {  // across kinks, where slopes mislead
+            others.set_budget_left(runs_across_kinks);
+            const Eigen::VectorXd lowest = others.best()->x;
+            minimize(others, lowest, {"sbplx"});
+        }
         if (others.best()) {
             return Run{with(others.best()->x, j, start[j]), others.best()->evaluation};
         }

@@ -11,6 +11,8 @@ struct Window {
     /// What lies within a half width of a centre along each axis.
     Window(const Eigen::VectorXd& centre, const Eigen::VectorXd& half_width)
         : low((centre - half_width).cwiseMax(0.0)), high((centre + half_width).cwiseMin(1.0)) {}
+    Window(const Eigen::VectorXd& centre, const Eigen::VectorXd& below, const Eigen::VectorXd& above)
+        : low((centre - below).cwiseMax(0.0)), high((centre + above).cwiseMin(1.0)) {}
     Window(const Eigen::VectorXd& centre, double half_width) : Window(centre, Eigen::VectorXd::Constant(centre.size(), half_width)) {}
 
     Eigen::VectorXd width() const { return high - low; }
