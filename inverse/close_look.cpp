@@ -17,6 +17,7 @@ constexpr double room = 3;               // for correlation, and from one window
 constexpr double errors_wide = 12;       // half width in standard errors: a difference is three quarters of one
 constexpr double agreement = 1.4;        // of a window with the errors that it finds
 constexpr int most_rounds = 6;
+constexpr int most_profiles = 4;         // in windows of rising width
 
 bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
 
@@ -96,13 +97,20 @@ CloseLook look_close(const Objective& objective, const Objective::Evaluate& near
         here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step);
         return here;
     };
-    CloseLook first = look(as_wide_as_the_misfit_says(near, x));
+    const CloseLook first = look(as_wide_as_the_misfit_says(near, x));
     CloseLook found = first;
     while (!all_told(found.uncertainty) && !is_whole(found.window) && !objective.stopped()) {
         found = look(wider(found.window, x));
     }
     if (!all_told(found.uncertainty)) {
-        return take_profile(first) ? first : found;
+        CloseLook here = first;
+        for (int i = 0; i < most_profiles && !objective.stopped(); ++i) {
+            if (take_profile(here)) {
+                return here;
+            }
+            here = look(wider(here.window, x));
+        }
+        return found;
     }
     for (int round = 0; round < most_rounds && !objective.stopped(); ++round) {
         const Eigen::VectorXd errors = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());

@@ -182,7 +182,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     Objective objective(
         box.size(), [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = box.values(x);
-            Evaluation evaluation = store.at(values, [&] { return shared(values, share); });
+            // Runs that go on from one another are made again after a kill: without them the next ones would differ in their last digits.
+            const auto run = [&] { return shared(values, share); };
+            Evaluation evaluation = in_order ? store.again(values, run) : store.at(values, run);
             model.weigh(evaluation, values);  // stored ones may have been weighed by another resolution
             return evaluation;
         },

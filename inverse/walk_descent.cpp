@@ -1,6 +1,7 @@
 #include "inverse/walk_descent.hpp"
 
 #include "inverse/minimize.hpp"
+#include "inverse/sobol_points.hpp"
 #include "inverse/window.hpp"
 
 #include <Eigen/Cholesky>
@@ -72,10 +73,8 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
 Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
     Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
                     most_cheap_runs, objective.threads(), objective.stop());
-    std::vector<Eigen::VectorXd> starts{window.share(centre)};
-    for (int i = 1; i < model_starts * static_cast<int>(centre.size()); ++i) {
-        starts.push_back(halton(i, centre.size(), seed));
-    }
+    std::vector<Eigen::VectorXd> starts = sobol_points(model_starts * static_cast<int>(centre.size()), centre.size(), seed);
+    starts.front() = window.share(centre);
     cheap.at(starts);
     std::vector<Run> order = cheap.runs();
     std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
@@ -97,8 +96,8 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
 
 void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed) {
     std::vector<Eigen::VectorXd> points{x};
-    for (int i = 1; i <= points_a_parameter * static_cast<int>(x.size()); ++i) {
-        const Eigen::VectorXd away = 1.5 * step * (2.0 * halton(i, x.size(), seed).array() - 1.0);
+    for (const Eigen::VectorXd& even : sobol_points(points_a_parameter * static_cast<int>(x.size()), x.size(), seed)) {
+        const Eigen::VectorXd away = 1.5 * step * (2.0 * even.array() - 1.0);
         points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
     }
     objective.at(points);
@@ -152,7 +151,7 @@ SearchResult descend_by_walks(Objective& objective, const Near& near, const Near
            !(objective.best() && is_explained(*objective.best()->evaluation, initial.size()))) {
         const double least = objective.best() ? objective.best()->evaluation->misfit : INFINITY;
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : halton(descents, initial.size(), seed), seed);
+        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : sobol_point(descents, initial.size(), seed), seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {
