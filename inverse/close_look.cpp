@@ -49,27 +49,37 @@ Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::
 
 Window wider(const Window& window, const Eigen::VectorXd& x) { return {x, room * (x - window.low), room * (window.high - x)}; }
 
-// Puts the profile's intervals in the place of those that a parabola does not give. False where one of them does not end.
+// Puts the profile's intervals in the place of those of a parabola. False where one of them does not end in the window.
 bool take_profile(CloseLook& look) {
     Uncertainty& u = look.uncertainty;
+    if (u.model_variance.size() == 0) {
+        return false;
+    }
+    const bool told = all_told(u);
     const double level = u.quantile * u.quantile * u.widening;
     Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
     for (Eigen::Index j = 0; j < lower.size(); ++j) {
-        constexpr double step_of = 0.1;  // of the window, twice that of the profile
-        const Profile profile = profile_likelihood(look.objective, u.best, j, step_of, level);
+        constexpr double coarse = 0.1;  // of the window: twice the profile's steps
+        const Profile profile = profile_likelihood(look.objective, u.best, j, told ? std::sqrt(u.covariance(j, j)) : coarse, level);
         const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
-        lower[j] = ends.first;
-        upper[j] = ends.second;
+        if (ends.first <= 0.0 || ends.second >= 1.0) {
+            return false;
+        }
+        // The model's own scatter, which no profile of it shows, comes on top.
+        const double x = u.best.x[j], own = told ? u.quantile * std::sqrt(u.model_variance[j]) : 0.0;
+        lower[j] = std::max(0.0, x - std::hypot(x - ends.first, own));
+        upper[j] = std::min(1.0, x + std::hypot(ends.second - x, own));
     }
-    if (lower.minCoeff() <= 0.0 || upper.maxCoeff() >= 1.0) {
-        return false;
+    // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
+    u.lower_95 = told ? Eigen::VectorXd(lower.cwiseMin(u.lower_95)) : lower;
+    u.upper_95 = told ? Eigen::VectorXd(upper.cwiseMax(u.upper_95)) : upper;
+    if (!told) {
+        u.covariance = ((upper - lower) / (2 * u.quantile)).cwiseAbs2().asDiagonal();
+        u.message.erase(u.message.find(u.untold), u.untold.size());
+        u.untold.clear();
     }
-    u.lower_95 = lower;
-    u.upper_95 = upper;
-    u.covariance = ((upper - lower) / (2 * u.quantile)).cwiseAbs2().asDiagonal();
-    u.message.erase(u.message.find(u.untold), u.untold.size());
-    u.untold.clear();
-    u.message += "The misfit is no parabola about its lowest point: the intervals are those of the profile likelihood. ";
+    u.message += told ? "The intervals are the wider of those of the covariance and of the profile likelihood. "
+                      : "The intervals are those of the profile likelihood. ";
     return true;
 }
 
@@ -102,17 +112,7 @@ CloseLook look_close(const Objective& objective, const Objective::Evaluate& near
     while (!all_told(found.uncertainty) && !is_whole(found.window) && !objective.stopped()) {
         found = look(wider(found.window, x));
     }
-    if (!all_told(found.uncertainty)) {
-        CloseLook here = first;
-        for (int i = 0; i < most_profiles && !objective.stopped(); ++i) {
-            if (take_profile(here)) {
-                return here;
-            }
-            here = look(wider(here.window, x));
-        }
-        return found;
-    }
-    for (int round = 0; round < most_rounds && !objective.stopped(); ++round) {
+    for (int round = 0; round < most_rounds && all_told(found.uncertainty) && !objective.stopped(); ++round) {
         const Eigen::VectorXd errors = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());
         const Window wanted(x, errors_wide * errors);
         const Eigen::VectorXd ratio = wanted.width().cwiseQuotient(found.window.width());
@@ -124,6 +124,13 @@ CloseLook look_close(const Objective& objective, const Objective::Evaluate& near
             break;
         }
         found = std::move(here);
+    }
+    CloseLook profiled = all_told(found.uncertainty) ? found : first;
+    for (int i = 0; i < most_profiles && !objective.stopped(); ++i) {
+        if (take_profile(profiled)) {
+            return profiled;
+        }
+        profiled = look(wider(profiled.window, x));
     }
     return found;
 }

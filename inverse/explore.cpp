@@ -112,7 +112,7 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const 
                                        window.low[k] > 0.0 || window.high[k] < 1.0 ? "many standard errors" : "its bounds");
         }
     }
-    if (!exploration.profiles.empty()) {
+    if (!exploration.profiles.empty() && fit.message.find("profile likelihood") == std::string::npos) {
         fit.message += "The intervals are those of the profile likelihood. ";
     }
     for (const Run& sample : exploration.posterior.samples) {

@@ -193,8 +193,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         return;
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
-    // What happens between two rows is known to a uniform distribution over the interval.
-    const double sampling = (to - from) / static_cast<double>(rows.x().size() - 1) / std::sqrt(12.0);
+    const double sampling = (to - from) / static_cast<double>(rows.x().size() - 1);
     const double spacing =
         std::max(std::min(std::clamp(growth / 24, near_stations, far_stations), growth / 2), growth / most_arrivals);
     const std::size_t first = stations_.size();

@@ -25,7 +25,7 @@ class Curve;
 ///
 /// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth. What the
 /// crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a; it is never
-/// below that of a place somewhere in a sampling interval, so that a jump has no infinite weight, and stations reached within one window share
+/// below the sampling interval, so that a jump has no infinite weight, and stations reached within one window share
 /// their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
