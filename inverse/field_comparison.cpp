@@ -24,8 +24,8 @@ double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
 }
 
 // A small motion of the whole picture: a translation, and a turn about the origin.
-Eigen::Matrix<double, 2, 3> motion_at(const Vec2& place) {
-    Eigen::Matrix<double, 2, 3> rows;
+Eigen::MatrixXd motion_at(const Vec2& place) {
+    Eigen::MatrixXd rows(2, 3);
     rows << 1, 0, -place.y(), 0, 1, place.x();
     return rows;
 }
