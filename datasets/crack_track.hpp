@@ -18,9 +18,10 @@ enum class TipStatus : std::uint8_t {
     too_few_points,  // of the image were followed
     no_crack,        // a field without a crack describes the displacements as well
     outside,         // the crack's tip is not in the picture
+    not_lined_up,    // the picture shows something else than the reference
 };
 
-inline constexpr std::size_t tip_status_count = 4;
+inline constexpr std::size_t tip_status_count = 5;
 
 /// In words, as the table `series` prints it.
 const char* name(TipStatus status);
