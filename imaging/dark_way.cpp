@@ -176,8 +176,29 @@ cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, cv::Si
     return mouth;
 }
 
-/// The middle of what is set from one of its ends to the other, the mouth first.
-DarkWay middle_of(const cv::Mat& set) {
+/// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack does; else the
+/// end that is clearly wider; else the one nearer to the border.
+bool back_is_mouth(const DarkWay& way, const cv::Mat& ground, bool back_is_nearer) {
+    const auto beyond = [&](bool back) {
+        const cv::Point2d end = back ? way.points.back() : way.points.front(), d = direction_at(way.points, back, heading);
+        double darkest = INFINITY;
+        for (int i = 2; i <= 12; ++i)
+            if (const cv::Point at = end + i * d; cv::Rect({0, 0}, ground.size()).contains(at))
+                darkest = std::min<double>(darkest, ground.at<float>(at));
+        return darkest;
+    };
+    const double front = beyond(false), back = beyond(true);
+    if (std::min(front, back) < 0.6 * std::max(front, back))
+        return back < front;
+    const std::size_t count = way.points.size(), part = std::max<std::size_t>(1, count / 4);
+    const double wide_front = mean_of(way.half_width, 0, part), wide_back = mean_of(way.half_width, count - part, count);
+    if (std::min(wide_front, wide_back) < 0.8 * std::max(wide_front, wide_back))
+        return wide_back > wide_front;
+    return back_is_nearer;
+}
+
+/// The middle of what is set from one of its ends to the other, the mouth first; `ground` is the reference.
+DarkWay middle_of(const cv::Mat& set, const cv::Mat& ground) {
     const cv::Rect box = cv::boundingRect(set);
     const cv::Mat mask = set(box);
     cv::Mat padded, to_rim;
@@ -195,9 +216,7 @@ DarkWay middle_of(const cv::Mat& set) {
     }
     const double front = to_border(way.points.front(), set.size()), back = to_border(way.points.back(), set.size());
     way.ends_inside = std::max(front, back) > at_border;
-    const std::size_t count = way.points.size(), part = std::max<std::size_t>(1, count / 4);
-    const bool from_inside = std::min(front, back) > at_border;  // as from a notch: its mouth is the wider end
-    if (from_inside ? mean_of(way.half_width, 0, part) < mean_of(way.half_width, count - part, count) : back < front) {
+    if (mouth.x < 0 && back_is_mouth(way, ground, back < front)) {
         std::ranges::reverse(way.points);
         std::ranges::reverse(way.half_width);
     }
@@ -227,13 +246,13 @@ std::pair<cv::Point, int> next_patch(const Patches& patches, const std::vector<c
 }
 
 /// The strongest patch, and those that go on from its ends: where a crack passes through dark wood its line may be broken.
-cv::Mat join_patches(const Patches& patches) {
+cv::Mat join_patches(const Patches& patches, const cv::Mat& ground) {
     std::vector<char> taken(patches.score.size(), 0);
     taken[patches.strongest] = 1;
     cv::Mat joined = patches.numbers == patches.strongest;
     for (bool grown = true; grown;) {
         grown = false;
-        const DarkWay way = middle_of(joined);
+        const DarkWay way = middle_of(joined, ground);
         for (const bool back : {false, true}) {
             const cv::Point2d end = back ? way.points.back() : way.points.front();
             const auto [place, patch] = next_patch(patches, taken, end, direction_at(way.points, back, heading));
@@ -265,8 +284,8 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     const Contrast contrast = compare(before, now, inner, least, tolerance);
     if (contrast.dark.strongest == 0)
         return std::nullopt;
-    const cv::Mat joined = join_patches(contrast.dark);
-    const DarkWay way = middle_of(joined);
+    const cv::Mat joined = join_patches(contrast.dark, before);
+    const DarkWay way = middle_of(joined, before);
     const double length = static_cast<double>(way.points.size()), width = cv::countNonZero(joined) / length;
     if (length < std::max(least_length, least_slender * width))
         return std::nullopt;

@@ -89,6 +89,7 @@ OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, cons
 struct Tip {
     cv::Point2d place, direction;
     double along, sigma;  // from the line's first point [px]
+    std::vector<cv::Point2d> way;
 };
 
 /// The tip along a line that is lost at its end.
@@ -108,7 +109,10 @@ std::optional<Tip> tip_along(const cv::Mat& reference, const cv::Mat& seen, cons
     const auto i = static_cast<std::size_t>(start->place);
     const double part = start->place - static_cast<double>(i);
     const cv::Point2d place = line[i] + part * (line[std::min(i + 1, line.size() - 1)] - line[i]);
-    return Tip{place, d, static_cast<double>(from) + start->place, start->sigma};
+    std::vector<cv::Point2d> whole(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(from));
+    whole.insert(whole.end(), line.begin(), line.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    whole.push_back(place);
+    return Tip{place, d, static_cast<double>(from) + start->place, start->sigma, std::move(whole)};
 }
 
 /// How much a place counts when the wood about the tip is lined up.
@@ -176,6 +180,8 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);
     found.length = to_border(way->points.front(), direction_at(way->points, false, heading), size) + tip->along;
+    for (const cv::Point2d& point : tip->way)
+        found.way.emplace_back(point.x, point.y);
     found.sigma = std::hypot(tip->sigma, place_error);
     return found;
 }

@@ -15,6 +15,7 @@ constexpr double coarsest_side = 40;      // shorter side of the coarsest copies
 constexpr double most_pixels = 1 << 20;   // of the finest copies: more says no more
 constexpr int most_iterations = 30;
 constexpr double settled = 1e-3;          // [px]
+constexpr double least_seen = 2;           // of a motion, in what noise would say of it
 constexpr double tukey = 4.685;           // 95 % efficient for Gaussian noise (Holland and Welsch 1977)
 
 using Row = Eigen::Matrix<double, parameters, 1>;
@@ -89,8 +90,16 @@ double modelled(const Alignment& now, const Unit& unit, int x, int y, double ref
     return (now.light[0] + now.light[1] * unit.x(x) + now.light[2] * unit.y(y)) * reference + now.light[3];
 }
 
-/// A step of Gauss-Newton; gives the farthest that it moves a place of the picture [px].
-double improve(const Level& level, Alignment& now, const cv::Matx23d& start, double likely) {
+using Motion = Eigen::Matrix<double, motions, 1>;
+using Information = Eigen::Matrix<double, motions, motions>;
+
+/// What the pictures say of the motion, and what they would say if noise were all there is.
+struct Evidence {
+    Information found = Information::Zero(), by_noise = Information::Zero();
+};
+
+/// A step of Gauss-Newton, of the light alone unless it `moves`; gives the farthest that it moves a place of the picture [px].
+double improve(const Level& level, Alignment& now, const cv::Matx23d& start, double likely, bool moves, Evidence& evidence) {
     const cv::Size size = level.reference.size();
     const Unit unit(size);
     const auto warped = [&](const cv::Mat& of) {
@@ -109,6 +118,7 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
 
     Normal normal = Normal::Zero();
     Row right = Row::Zero();
+    evidence = {};
     for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x) {
             const double gx = by_x.at<float>(y, x), gy = by_y.at<float>(y, x);
@@ -124,12 +134,23 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
             row << gx, gx * a, gx * b, gy, gy * a, gy * b, -reference, -reference * a, -reference * b, -1;
             normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
             right -= weight * left * row;
+            const Eigen::Vector3d place(1, a, b);
+            evidence.by_noise.topLeftCorner<3, 3>() += weight * place * place.transpose();
         }
+    // Noise v in both pictures, blurred by a pixel, leaves 2 v and slopes of v / 2.
+    evidence.by_noise.topLeftCorner<3, 3>() *= 0.25 * now.residual * now.residual;
+    evidence.by_noise.bottomRightCorner<3, 3>() = evidence.by_noise.topLeftCorner<3, 3>();
+    evidence.found = Normal(normal.selfadjointView<Eigen::Lower>()).topLeftCorner<motions, motions>();
+    if (!moves) {
+        normal.topRows<motions>().setZero();
+        normal.leftCols<motions>().setZero();
+        right.head<motions>().setZero();
+    }
     const double hold = now.residual * now.residual / (likely * likely);
     const Row away = between(start, now.map, unit);
     for (int i = 0; i < motions; ++i) {
         normal(i, i) += hold;
-        right[i] -= hold * away[i];
+        right[i] -= moves ? hold * away[i] : 0;
     }
     for (int i = motions; i < parameters; ++i)
         normal(i, i) *= 1 + 1e-9;
@@ -141,6 +162,20 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
     for (int i = 0; i < 4; ++i)
         now.light[i] += step[motions + i];
     return step.head<motions>().cwiseAbs().maxCoeff();
+}
+
+/// Takes back what the pictures do not show: motions in which their slopes are no more than noise, as along straight rings.
+void take_back_unseen(Alignment& now, const cv::Matx23d& start, const Evidence& evidence, const Unit& unit) {
+    const Information noise = evidence.by_noise + 1e-9 * evidence.by_noise.trace() * Information::Identity();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Information> parts(evidence.found, noise);
+    if (parts.info() != Eigen::Success)
+        return;
+    const Motion away = between(start, now.map, unit).head<motions>();
+    Row back = Row::Zero();
+    for (int i = 0; i < motions; ++i)
+        if (const Motion part = parts.eigenvectors().col(i); parts.eigenvalues()[i] < least_seen)
+            back.head<motions>() -= part * part.dot(noise * away);  // eigenvectors are of length 1 by the noise
+    move(now.map, back, unit);
 }
 
 }  // namespace
@@ -168,8 +203,12 @@ Alignment line_up(const cv::Mat& reference, const cv::Mat& image, const cv::Mat&
         const Level level = level_at(reference, image, weight, scale);
         now.map = scaled(now.map, scale);
         const cv::Matx23d held = scaled(start.map, scale);
-        for (int i = 0; i < most_iterations && improve(level, now, held, scale * likely) > settled; ++i) {
+        Evidence evidence;
+        for (int i = 0; i < most_iterations && improve(level, now, held, scale * likely, true, evidence) > settled; ++i) {
         }
+        take_back_unseen(now, held, evidence, Unit(level.reference.size()));
+        for (int i = 0; i < 3; ++i)
+            improve(level, now, held, scale * likely, false, evidence);
         now.map = scaled(now.map, 1 / scale);
         if (scale >= finest)
             return now;

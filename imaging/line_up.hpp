@@ -17,7 +17,8 @@ struct Alignment {
 
 /// Lines an image up with the reference: Gauss-Newton over an affine motion and the light, from a coarse copy of both to the fine ones (Lucas
 /// and Kanade 1981), Tukey's weights against what moved otherwise. `weight` [float, as large] says how much each pixel counts; empty: all alike.
-/// Where the pictures show no motion there is none: it is held to `start` as by a measurement of `likely` pixels' shift over the picture.
+/// Motions that the pictures do not show, as along straight rings, are left as in `start`; the others are held to it as by a measurement of
+/// `likely` pixels' shift over the picture.
 Alignment line_up(const cv::Mat& reference, const cv::Mat& image, const cv::Mat& weight, const Alignment& start, double likely);
 
 /// The image as it would be seen in the reference's place and light.
