@@ -10,8 +10,6 @@
 
 namespace crampfit::cli {
 
-namespace {
-
 std::vector<std::uint8_t> read_mask(const std::filesystem::path& file, const FinePicture& reference) {
     if (file.empty())
         return {};
@@ -24,8 +22,6 @@ std::vector<std::uint8_t> read_mask(const std::filesystem::path& file, const Fin
         throw InputError("command line", "--mask", file.string(), "is black all over: black is left out");
     return std::move(mask.gray);
 }
-
-}  // namespace
 
 void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string& file_kind) {
     verb.add_option("reference", series.reference, "The picture that all others are compared with")

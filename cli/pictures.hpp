@@ -34,6 +34,9 @@ std::optional<double> pixel_of(const PictureSeries& series);
 FinePicture read_reference(const PictureSeries& series);
 FinePicture read_image(const PictureSeries& series, int image);
 
+/// A pixel each, 0 where nothing is to be followed; empty where `file` is. Throws InputError.
+std::vector<std::uint8_t> read_mask(const std::filesystem::path& file, const FinePicture& reference);
+
 /// Reads reference and mask, and looks at every image: a bad one among many is found before hours are spent on the
 /// others. Throws InputError.
 Correlator make_correlator(const PictureSeries& series, const CommonOptions& common);

@@ -6,11 +6,13 @@
 #include "datasets/crack_track.hpp"
 #include "imaging/crack_tip.hpp"
 #include "imaging/field_preview.hpp"
+#include "imaging/gray_track.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 namespace crampfit::cli {
 
@@ -19,6 +21,40 @@ namespace {
 struct Arguments {
     PictureSeries pictures;
     PictureTimes times;
+    std::string from = "auto";  // auto, fields or gray
+};
+
+/// The tip by the displacement field, by the picture's gray, or by the gray where the field shows none.
+class TipFinder {
+  public:
+    TipFinder(const PictureSeries& pictures, const std::string& from, const CommonOptions& common)
+        : correlator_(make_correlator(pictures, common)), by_fields_(from != "gray") {
+        const FinePicture reference = read_reference(pictures);
+        geometry_ = {correlator_.lattice(), pictures.options.subset, reference.columns, reference.rows};
+        if (from != "fields")
+            gray_.emplace(reference, read_mask(pictures.mask, reference));
+    }
+
+    CrackTip operator()(const FinePicture& image) {
+        CrackTip tip;
+        if (by_fields_)
+            tip = find_crack_tip(geometry_, correlator_.field(image));
+        if (!gray_ || (by_fields_ && tip.status == TipStatus::ok))
+            return tip;
+        const CrackTip by_gray = gray_->tip(image);
+        const bool seen = by_gray.status == TipStatus::ok || by_gray.status == TipStatus::outside;
+        from_gray_ += seen;
+        return seen || !by_fields_ || tip.status == TipStatus::too_few_points ? by_gray : tip;
+    }
+
+    int from_gray() const { return from_gray_; }
+
+  private:
+    Correlator correlator_;
+    FieldGeometry geometry_;
+    std::optional<GrayTracker> gray_;
+    bool by_fields_;
+    int from_gray_ = 0;
 };
 
 CrackTrack start_track(const Arguments& arguments, const CommonOptions& common) {
@@ -46,15 +82,13 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
     const PictureSeries& pictures = arguments.pictures;
     check_series(pictures, common);
     CrackTrack track = start_track(arguments, common);
-    const FinePicture reference = read_reference(pictures);
-    const Correlator correlator = make_correlator(pictures, common);
-    const FieldGeometry geometry{correlator.lattice(), pictures.options.subset, reference.columns, reference.rows};
+    TipFinder find_tip(pictures, arguments.from, common);
 
     stop_on_signals();
     ProgressLine line(common, "images");
     const int count = static_cast<int>(pictures.images.size());
     for (int image = 0; image < count && !stop_requested(); ++image) {
-        track.tips.push_back(find_crack_tip(geometry, correlator.field(read_image(pictures, image))));
+        track.tips.push_back(find_tip(read_image(pictures, image)));
         line.show(static_cast<double>(image + 1) / count, image + 1, name(track.tips.back().status));
     }
     const int done = static_cast<int>(track.tips.size());
@@ -62,8 +96,8 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
     write(track, pictures.output);
     if (!pictures.preview.empty() && done > 0)
         draw_track(read_image(pictures, done - 1), track.tips, pictures.preview);
-    report(common, fmt::format("tip found in {} of {} images, saved as {}",
-                               std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status), done,
+    report(common, fmt::format("tip found in {} of {} images{}, saved as {}", std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status),
+                               done, find_tip.from_gray() > 0 ? fmt::format(", {} by the dark line that the crack is", find_tip.from_gray()) : "",
                                pictures.output.string()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
@@ -75,6 +109,10 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     CLI::App* verb = command.add_subcommand("track", "Crack tip and crack length from pictures");
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
     add_picture_times(*verb, arguments->times);
+    verb->add_option("--from", arguments->from,
+                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements show no crack")
+        ->check(CLI::IsMember({"auto", "fields", "gray"}))
+        ->capture_default_str();
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};
 }
 

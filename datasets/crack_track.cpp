@@ -16,7 +16,7 @@ using hdf5::Group;
 namespace {
 
 constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack",
-                                                                 "tip outside the picture"};
+                                                                 "tip outside the picture", "not lined up with the reference"};
 
 struct TipColumn {
     const char* name;

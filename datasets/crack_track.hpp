@@ -18,9 +18,10 @@ enum class TipStatus : std::uint8_t {
     too_few_points,  // of the image were followed
     no_crack,        // a field without a crack describes the displacements as well
     outside,         // the crack's tip is not in the picture
+    not_lined_up,    // the picture shows something else than the reference
 };
 
-inline constexpr std::size_t tip_status_count = 4;
+inline constexpr std::size_t tip_status_count = 5;
 
 /// In words, as the table `series` prints it.
 const char* name(TipStatus status);
@@ -34,6 +35,7 @@ struct CrackTip {
     double angle = unknown;      // in which the crack points, clockwise as seen, from +x [rad]
     double length = unknown;     // from where the crack's line enters the picture to the tip [px]
     double sigma = unknown;      // standard error of the length [px]
+    std::vector<Vec2> way = {};  // of the crack from its mouth to the tip, where it was followed; else it is straight. For drawings: not saved [px]
 };
 
 /// How the images' clock was set by the load's: load time = offset + rate * image time.

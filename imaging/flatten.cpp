@@ -39,10 +39,11 @@ cv::Mat flatten(const cv::Mat& gray, const cv::Mat& valid) {
     Terms light = normal.ldlt().solve(right);
     light[0] = -(light[3] + light[5]) / 3;  // the mean of a^2 and of b^2 over the picture is 1/3
     cv::Mat flat(gray.size(), CV_32F);
-    for (int y = 0; y < gray.rows; ++y)
-        for (int x = 0; x < gray.cols; ++x)
-            flat.at<float>(y, x) =
-                gray.at<float>(y, x) * static_cast<float>(std::exp(-light.dot(terms_at(x, y, gray.size()))));
+    cv::parallel_for_({0, gray.rows}, [&](const cv::Range& rows) {
+        for (int y = rows.start; y < rows.end; ++y)
+            for (int x = 0; x < gray.cols; ++x)
+                flat.at<float>(y, x) = gray.at<float>(y, x) * static_cast<float>(std::exp(-light.dot(terms_at(x, y, gray.size()))));
+    });
     return flat;
 }
 

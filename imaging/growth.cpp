@@ -16,8 +16,7 @@ constexpr double plain_spread = 0.05;    // of the radial direction across the p
 
 /// Sum of the cubes of gray's steps down the straightened columns, over that of their sizes.
 double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
-    const StraightPicture straight =
-        straighten(gray, valid, rings, std::clamp(gray.cols / 60.0, 1.0, 20.0));
+    const StraightPicture straight = StraightWood(gray, valid, rings).blurred_along(std::clamp(gray.cols / 60.0, 1.0, 20.0));
     cv::Mat smooth, slope, unknown;
     cv::GaussianBlur(straight.gray, smooth, {1, 0}, 1.5, 1.5);
     cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));

@@ -25,15 +25,26 @@ struct StraightPicture {
     cv::Mat known;  // same size, share of what counts, 0..1
 };
 
-/// `gray` and `valid` (0 or 1) are float pictures in the frame; `along` is the Gaussian's standard deviation [pixels].
-StraightPicture straighten(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double along);
+/// Wood straightened once, to be blurred as far as each use of it needs.
+class StraightWood {
+  public:
+    /// `gray` and `valid` (0 or 1) are float pictures in the frame.
+    StraightWood(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings)
+        : gray_(rings.straighten(gray.mul(valid))), known_(rings.straighten(valid)) {}
+
+    /// By a Gaussian of this standard deviation [pixels].
+    StraightPicture blurred_along(double sigma) const;
+
+  private:
+    cv::Mat gray_, known_;
+};
 
 /// Where LW ends and the EW of the next ring begins: the sharp rise of gray with the growth. Rises are found in profiles
 /// across the rings by their prominence against the contrast around them, joined from profile to profile along the ring
 /// coordinate, kept where at least half of the profiles show them, and laid through the steepest places by dynamic
 /// programming. From the pith outward. `blank` is 255 where nothing is photographed (`find_blank`). `ring_width` [pixels] is a guess, or 0
 /// for none.
-std::vector<BorderLine> find_ring_borders(const cv::Mat& gray, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
+std::vector<BorderLine> find_ring_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                           double ring_width);
 
 /// Median distance of neighbouring borders along the growth [pixels]; 0 for less than two borders.

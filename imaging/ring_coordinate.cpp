@@ -139,40 +139,64 @@ double RingCoordinate::v(double u, double psi) const {
     return spacing_v_ * (low + (psi - above) / (below - above));
 }
 
-cv::Mat RingCoordinate::straighten(const cv::Mat& in_frame) const {
-    CV_Assert(in_frame.type() == CV_32F && in_frame.size() == frame_);
-    cv::Mat straight = cv::Mat::zeros(straight_rows(), in_frame.cols, CV_32F);
-    std::vector<double> knots(values_.rows);  // of a column
-    for (int u = 0; u < in_frame.cols; ++u) {
+void RingCoordinate::straighten_columns(const cv::Mat& in_frame, int first, int count, cv::Mat& straight) const {
+    cv::Mat knots(count, values_.rows, CV_64F);
+    for (int i = 0; i < count; ++i)
         for (int j = 0; j < values_.rows; ++j)
-            knots[j] = knot(u, j);
-        int low = 0;
-        for (int row = 0; row < straight.rows; ++row) {
-            const double psi = lowest_ + row;
-            while (low + 2 < values_.rows && knots[low + 1] <= psi)
+            knots.at<double>(i, j) = knot(first + i, j);
+    std::vector<int> lows(count, 0);
+    for (int row = 0; row < straight.rows; ++row) {
+        const double psi = lowest_ + row;
+        for (int i = 0; i < count; ++i) {
+            const double* at = knots.ptr<double>(i);
+            int& low = lows[i];
+            while (low + 2 < values_.rows && at[low + 1] <= psi)
                 ++low;
-            const double place = spacing_v_ * (low + (psi - knots[low]) / (knots[low + 1] - knots[low]));
+            const double place = spacing_v_ * (low + (psi - at[low]) / (at[low + 1] - at[low]));
             if (place < 0 || place > in_frame.rows - 1)
                 continue;
-            const int j = std::min(static_cast<int>(place), in_frame.rows - 2);
+            const int u = first + i, j = std::min(static_cast<int>(place), in_frame.rows - 2);
             const auto a = static_cast<float>(place - j);
             straight.at<float>(row, u) = (1 - a) * in_frame.at<float>(j, u) + a * in_frame.at<float>(j + 1, u);
         }
     }
+}
+
+cv::Mat RingCoordinate::straighten(const cv::Mat& in_frame) const {
+    CV_Assert(in_frame.type() == CV_32F && in_frame.size() == frame_);
+    constexpr int strip = 64;  // columns that go down the rows together: one by itself would touch a line of cache for each pixel
+    cv::Mat straight = cv::Mat::zeros(straight_rows(), in_frame.cols, CV_32F);
+    cv::parallel_for_({0, (in_frame.cols + strip - 1) / strip}, [&](const cv::Range& strips) {
+        for (int first = strip * strips.start; first < std::min(in_frame.cols, strip * strips.end); first += strip)
+            straighten_columns(in_frame, first, std::min(strip, in_frame.cols - first), straight);
+    });
     return straight;
 }
 
 cv::Mat RingCoordinate::bend(const cv::Mat& straight) const {
     CV_Assert(straight.type() == CV_32F && straight.cols == frame_.width);
     cv::Mat in_frame(frame_, CV_32F);
-    for (int u = 0; u < frame_.width; ++u) {
-        for (int v = 0; v < frame_.height; ++v) {
-            const double row = std::clamp(psi(u, v) - lowest_, 0.0, straight.rows - 1.0);
-            const int j = std::min(static_cast<int>(row), straight.rows - 2);
-            const auto a = static_cast<float>(row - j);
-            in_frame.at<float>(v, u) = (1 - a) * straight.at<float>(j, u) + a * straight.at<float>(j + 1, u);
+    cv::parallel_for_({0, frame_.height}, [&](const cv::Range& rows) {
+        std::vector<double> above(frame_.width), below(frame_.width);  // psi at the knots' rows to either side
+        int knots = -1;
+        for (int v = rows.start; v < rows.end; ++v) {
+            const double y = v / spacing_v_;
+            const int upper = std::clamp(static_cast<int>(std::floor(y)), 0, values_.rows - 2);
+            if (upper != knots)
+                for (int u = 0; u < frame_.width; ++u) {
+                    above[u] = knot(u, upper);
+                    below[u] = knot(u, upper + 1);
+                }
+            knots = upper;
+            for (int u = 0; u < frame_.width; ++u) {
+                const double psi = above[u] + (y - upper) * (below[u] - above[u]);
+                const double row = std::clamp(psi - lowest_, 0.0, straight.rows - 1.0);
+                const int j = std::min(static_cast<int>(row), straight.rows - 2);
+                const auto a = static_cast<float>(row - j);
+                in_frame.at<float>(v, u) = (1 - a) * straight.at<float>(j, u) + a * straight.at<float>(j + 1, u);
+            }
         }
-    }
+    });
     return in_frame;
 }
 

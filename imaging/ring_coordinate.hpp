@@ -30,6 +30,7 @@ class RingCoordinate {
 
   private:
     double knot(double u, int row) const;
+    void straighten_columns(const cv::Mat& in_frame, int first, int count, cv::Mat& straight) const;
 
     cv::Mat values_;  // [knot rows x knot columns] double
     double spacing_u_ = 1, spacing_v_ = 1;  // of knots [pixels]

@@ -104,19 +104,20 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
     frame.turn_back(valid).convertTo(counts, CV_8U, 255);
     round.orientation = measure_orientation(frame.turn_back(gray), counts, scale);
     const RingCoordinate rings(round.orientation, frame);
+    const StraightWood wood(gray, valid, rings);
     round.obstacle = obstacle(round.orientation);
     if (!given.empty())
         round.borders = lines_of(given, frame);
     else if (round.obstacle.empty())
-        round.borders = find_ring_borders(gray, valid, blank, rings, ring_width);
+        round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;
-    round.degree = density_degree(gray, valid, rings, round.borders, width, levels);
+    round.degree = density_degree(wood, valid, rings, round.borders, width, levels);
     if (round.borders.empty()) {  // then it is not known how dark LW is
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
     } else {
-        const cv::Mat around = rings.bend(straighten(gray, valid, rings, std::max(8.0, 0.5 * width)).gray);
+        const cv::Mat around = rings.bend(wood.blurred_along(std::max(8.0, 0.5 * width)).gray);
         round.features = find_foreign({gray, bgr, around, levels, width});
     }
     round.features.setTo(static_cast<double>(Feature::background), blank);
@@ -242,6 +243,8 @@ void SegmentOptions::validate() const {
 
 Segmentation segment(const std::filesystem::path& image, const SegmentOptions& options) {
     options.validate();
+    if (options.threads > 0)
+        cv::setNumThreads(options.threads);
     Segmentation result;
     const PictureKey key{"command line", "IMAGE"};
     const Pixels pixels = read_float(image, key);

@@ -20,6 +20,7 @@ struct SegmentOptions {
     std::vector<BorderPolyline> borders = {};  // corrected by hand; empty: found
     std::vector<GrayClass> gray = {};          // classes by the picture's own gray; empty: by each ring's; grays in no range are void
     std::optional<DensityTable> density = std::nullopt;  // what the picture's own gray stands for
+    int threads = 0;               // of OpenCV in this process; 0: as they are
     std::filesystem::path direction = {};      // picture of the same wood, as large, that the radial direction is seen in; empty: the same
 
     /// Throws InputError for anything out of range.

@@ -22,10 +22,10 @@ double quantile(std::vector<float>& values, double share) {
 }
 
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
-cv::Mat smooth_wood(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings, double ring_width) {
+cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
     cv::Mat smooth, missing;
     for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
-        const StraightPicture straight = straighten(gray, valid, rings, along);
+        const StraightPicture straight = wood.blurred_along(along);
         const cv::Mat here = rings.bend(straight.gray);
         if (smooth.empty())
             smooth = here;
@@ -154,16 +154,17 @@ void remove_specks(cv::Mat& label, int one, int other, double least) {
 
 cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
     cv::Mat numbers(frame, CV_32S, cv::Scalar(static_cast<double>(borders.size())));
-    for (std::size_t i = borders.size(); i-- > 0;)
+    std::vector<int> next(frame.width, 0);  // row of each column that no border before has passed
+    for (std::size_t i = 0; i < borders.size(); ++i)
         for (int u = std::max(0, borders[i].first); u < std::min(frame.width, borders[i].end()); ++u)
-            for (int v = 0; v < frame.height && v <= borders[i].at(u); ++v)
+            for (int& v = next[u]; v < frame.height && v <= borders[i].at(u); ++v)
                 numbers.at<int>(v, u) = static_cast<int>(i);
     return numbers;
 }
 
-cv::Mat density_degree(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
                        const std::vector<BorderLine>& borders, double ring_width, WoodLevels& levels) {
-    const cv::Mat smooth = smooth_wood(gray, valid, rings, ring_width);
+    const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
     std::vector<RingLevels> whole;          // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
@@ -183,25 +184,26 @@ cv::Mat density_degree(const cv::Mat& gray, const cv::Mat& valid, const RingCoor
         if (nearest_whole[i] < 0)
             nearest_whole[i] = nearest_whole[i + 1];
 
-    const cv::Mat numbers = ring_numbers(borders, gray.size());
-    cv::Mat degree(gray.size(), CV_32F);
+    const cv::Mat numbers = ring_numbers(borders, valid.size());
+    cv::Mat degree(valid.size(), CV_32F);
     const auto distance = [&](std::size_t border, int u, int v) {
         return border < borders.size() && borders[border].covers(u) ? v - borders[border].at(u)
                                                                     : std::numeric_limits<double>::infinity();
     };
-    for (int v = 0; v < gray.rows; ++v) {
-        for (int u = 0; u < gray.cols; ++u) {
-            const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
-            int from = v;
-            if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
-                from = std::max(0, v - 2);
-            else if (ring > 0 && distance(ring - 1, u, v) < mixed)
-                from = std::min(gray.rows - 1, v + 2);
-            const WoodLevels here = nearest_whole[ring] < 0 ? levels : whole[nearest_whole[ring]].at(u);
-            degree.at<float>(v, u) = static_cast<float>((here.earlywood - smooth.at<float>(from, u)) /
-                                                        std::max(here.contrast(), 1e-6));
-        }
-    }
+    cv::parallel_for_({0, valid.rows}, [&](const cv::Range& rows) {
+        for (int v = rows.start; v < rows.end; ++v)
+            for (int u = 0; u < valid.cols; ++u) {
+                const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
+                int from = v;
+                if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
+                    from = std::max(0, v - 2);
+                else if (ring > 0 && distance(ring - 1, u, v) < mixed)
+                    from = std::min(valid.rows - 1, v + 2);
+                const WoodLevels here = nearest_whole[ring] < 0 ? levels : whole[nearest_whole[ring]].at(u);
+                degree.at<float>(v, u) = static_cast<float>((here.earlywood - smooth.at<float>(from, u)) /
+                                                            std::max(here.contrast(), 1e-6));
+            }
+    });
     return degree;
 }
 

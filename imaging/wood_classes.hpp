@@ -20,7 +20,7 @@ struct WoodLevels {
 /// own brightest and darkest wood, which changes along the ring (the half-range rule: half way is 0.5). Where there is
 /// no whole ring, Otsu's threshold (1979) is half way and the means on its two sides are the ends. Beyond 0 and 1 where
 /// gray is. `levels` gets the medians.
-cv::Mat density_degree(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings,
+cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
                        const std::vector<BorderLine>& borders, double ring_width, WoodLevels& levels);
 
 /// Number of the ring that each pixel of the frame lies in: i up to border i, borders.size() beyond the last.

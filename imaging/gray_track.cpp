@@ -1,0 +1,189 @@
+#include "imaging/gray_track.hpp"
+
+#include "imaging/dark_way.hpp"
+#include "imaging/line_up.hpp"
+#include "imaging/opening.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr double likely_motion = 30;    // of the camera and the specimen as a whole [px]
+constexpr double likely_about_tip = 3;  // of the wood about the tip beside that [px]
+constexpr double place_error = 1;       // of the wood's motion about the tip and of the line's middle [px]
+constexpr double about = 40;            // standard deviation of what that is taken from [px]
+constexpr double most_left = 0.7;       // of the reference's contrast, in pictures that lie on each other
+constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
+constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
+constexpr double slack = 3;             // of the line's middle [px]
+constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
+
+cv::Mat pixels_of(const FinePicture& picture) {
+    return cv::Mat(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data())).clone();
+}
+
+/// Points a pixel apart along a line.
+std::vector<cv::Point2d> even(const std::vector<cv::Point2d>& line) {
+    std::vector<cv::Point2d> points{line.front()};
+    double left = 1;
+    for (std::size_t i = 1; i < line.size(); ++i) {
+        cv::Point2d from = line[i - 1];
+        for (double length = cv::norm(line[i] - from); length >= left; length = cv::norm(line[i] - from)) {
+            from += (line[i] - from) * (left / length);
+            points.push_back(from);
+            left = 1;
+        }
+        left -= cv::norm(line[i] - from);
+    }
+    return points;
+}
+
+/// How far it is from a place to the picture's border in a direction [px].
+double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
+    double length = std::numeric_limits<double>::infinity();
+    if (d.x != 0)
+        length = std::min(length, ((d.x > 0 ? size.width - 0.5 : -0.5) - from.x) / d.x);
+    if (d.y != 0)
+        length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
+    return std::max(length, 0.0);
+}
+
+/// The picture along a line and `reach` pixels to either side [points of the line x 2 reach + 1].
+cv::Mat strip_along(const cv::Mat& picture, const std::vector<cv::Point2d>& line, int reach) {
+    const int count = static_cast<int>(line.size());
+    cv::Mat places(count, 2 * reach + 1, CV_32FC2), strip;
+    for (int i = 0; i < count; ++i) {
+        const cv::Point2d along = line[static_cast<std::size_t>(std::min(i + 5, count - 1))] - line[static_cast<std::size_t>(std::max(i - 5, 0))];
+        const cv::Point2d across = cv::Point2d(-along.y, along.x) / std::max(cv::norm(along), 1e-9);
+        for (int j = -reach; j <= reach; ++j)
+            places.at<cv::Point2f>(i, j + reach) = line[static_cast<std::size_t>(i)] + j * across;
+    }
+    cv::remap(picture, strip, places, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+    return strip;
+}
+
+/// A crack that opens within a strip pushes wood out at its sides: the light that is missing, over that of the wood at the sides, is the
+/// opening, whatever the strip shows in between.
+OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, const std::vector<cv::Point2d>& line, int reach) {
+    const cv::Mat before = strip_along(reference, line, reach), now = strip_along(seen, line, reach);
+    const int count = before.rows, last = before.cols - 1;
+    const auto sum = [](const cv::Mat& strip, int row) { return cv::sum(strip.row(row))[0]; };
+    OpeningProfile profile;
+    for (int i = 0; i < count; ++i) {
+        const double left = cv::mean(before(cv::Rect(0, i, side, 1)))[0], right = cv::mean(before(cv::Rect(last + 1 - side, i, side, 1)))[0];
+        const double wood = std::max(0.5 * (left + right), 1.0);
+        profile.opening.push_back((sum(before, i) - sum(now, i)) / wood);
+        profile.along.push_back((sum(before, std::min(i + 1, count - 1)) - sum(before, std::max(i - 1, 0))) / (2 * wood));
+        profile.across.push_back((right - left) / wood);
+    }
+    return profile;
+}
+
+struct Tip {
+    cv::Point2d place, direction;
+    double along, sigma;  // from the line's first point [px]
+    std::vector<cv::Point2d> way;
+};
+
+/// The tip along a line that is lost at its end.
+std::optional<Tip> tip_along(const cv::Mat& reference, const cv::Mat& seen, const DarkWay& way) {
+    const std::vector<cv::Point2d> known = even(way.points);
+    const std::size_t from = known.size() > behind ? known.size() - behind : 0;
+    std::vector<cv::Point2d> line(known.begin() + static_cast<std::ptrdiff_t>(from), known.end());
+    const cv::Point2d d = direction_at(known, true, heading);
+    const int room = std::min(ahead, static_cast<int>(to_border(known.back(), d, reference.size())));
+    for (int i = 1; i <= room; ++i)
+        line.push_back(known.back() + i * d);
+    const std::size_t tail = way.half_width.size() > behind ? way.half_width.size() - behind : 0;
+    const double widest = *std::max_element(way.half_width.begin() + static_cast<std::ptrdiff_t>(tail), way.half_width.end());
+    const std::optional<OpeningStart> start = find_opening_start(opening_along(reference, seen, line, static_cast<int>(std::ceil(widest + slack))));
+    if (!start)
+        return std::nullopt;
+    const auto i = static_cast<std::size_t>(start->place);
+    const double part = start->place - static_cast<double>(i);
+    const cv::Point2d place = line[i] + part * (line[std::min(i + 1, line.size() - 1)] - line[i]);
+    std::vector<cv::Point2d> whole(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(from));
+    whole.insert(whole.end(), line.begin(), line.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    whole.push_back(place);
+    return Tip{place, d, static_cast<double>(from) + start->place, start->sigma, std::move(whole)};
+}
+
+/// How much a place counts when the wood about the tip is lined up.
+cv::Mat around(const cv::Point2d& tip, cv::Size size) {
+    cv::Mat weight(size, CV_32F);
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x)
+            weight.at<float>(y, x) = static_cast<float>(std::exp(-0.5 * (std::pow(x - tip.x, 2) + std::pow(y - tip.y, 2)) / (about * about)));
+    return weight;
+}
+
+/// A line that was found in one alignment, in another.
+DarkWay moved(DarkWay way, const Alignment& from, const Alignment& to) {
+    for (cv::Point2d& point : way.points)
+        point = to.to_reference(from.to_image(point));
+    return way;
+}
+
+}  // namespace
+
+struct GrayTracker::State {
+    cv::Mat reference, allowed;  // allowed: 0 where masked
+    double contrast = 0;
+};
+
+GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::uint8_t>& mask) {
+    auto state = std::make_unique<State>();
+    state->reference = pixels_of(reference);
+    state->allowed = cv::Mat(reference.rows, reference.columns, CV_8U, cv::Scalar(255));
+    if (!mask.empty())
+        state->allowed = cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(state->reference, mean, deviation, state->allowed);
+    state->contrast = deviation[0];
+    state_ = std::move(state);
+}
+
+GrayTracker::~GrayTracker() = default;
+
+CrackTip GrayTracker::tip(const FinePicture& picture) const {
+    const cv::Mat &reference = state_->reference, image = pixels_of(picture);
+    const cv::Size size = reference.size();
+    cv::Mat weight;
+    state_->allowed.convertTo(weight, CV_32F, 1.0 / 255);
+    const Alignment whole = line_up(reference, image, weight, {}, likely_motion);
+    CrackTip found;
+    if (whole.residual > most_left * state_->contrast) {
+        found.status = TipStatus::not_lined_up;
+        return found;
+    }
+    const cv::Mat seen = seen_as_reference(image, whole, size);
+    const std::optional<DarkWay> way = find_dark_way(reference, seen, shown_of_reference(image.size(), whole, size) & state_->allowed);
+    if (!way)
+        return found;
+    if (!way->ends_inside) {
+        found.status = TipStatus::outside;
+        return found;
+    }
+    // The wood about the tip moves by itself: once more, lined up there.
+    const Alignment about_tip = line_up(reference, image, weight.mul(around(way->points.back(), size)), whole, likely_about_tip);
+    const std::optional<Tip> tip = tip_along(reference, seen_as_reference(image, about_tip, size), moved(*way, whole, about_tip));
+    if (!tip)
+        return found;
+    found.status = TipStatus::ok;
+    found.tip = {tip->place.x, tip->place.y};
+    found.angle = std::atan2(tip->direction.y, tip->direction.x);
+    found.length = to_border(way->points.front(), direction_at(way->points, false, heading), size) + tip->along;
+    for (const cv::Point2d& point : tip->way)
+        found.way.emplace_back(point.x, point.y);
+    found.sigma = std::hypot(tip->sigma, place_error);
+    return found;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,129 @@
+// Tips of cracks that show as dark lines in plain pictures of wood, against a known truth.
+#include "imaging/gray_track.hpp"
+#include "imaging/opening.hpp"
+#include "tests/imaging/plane_fields.hpp"
+#include "tests/imaging/wood_camera.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <vector>
+
+using namespace crampfit;
+
+namespace {
+
+constexpr int columns = 480, rows = 400;
+
+/// Another light, and a camera that has moved and turned.
+WoodShot shaken(int seed) {
+    WoodShot shot;
+    shot.gain = 0.9;
+    shot.tilt = 0.08;
+    shot.offset = 4;
+    const double turn = 0.004;
+    shot.camera = {std::cos(turn), -std::sin(turn), 2.3, std::sin(turn), std::cos(turn), -1.7};
+    shot.seed = seed;
+    return shot;
+}
+
+struct Case {
+    const char* what;
+    double angle;    // [rad]
+    double opening;  // at 100 px behind the tip; a fifth of it slides [px]
+    double period;   // of the rings [px]
+    Vec2 pith;       // [px]
+    double worst, mean;  // bars: of the distance, and of the mean along the crack [px]
+};
+
+void expect_tips(const std::vector<Case>& cases) {
+    double squares = 0;
+    int count = 0, seed = 2;
+    for (const Case& one : cases) {
+        const WoodCamera camera(end_grain_picture(columns, rows, one.period, one.pith, 3), 10);
+        const GrayTracker tracker(camera.take({}), {});
+        const Vec2 direction(std::cos(one.angle), std::sin(one.angle));
+        double sum = 0;
+        for (const double way : {-100, 0, 100}) {
+            const Vec2 truth = Vec2(240.3, 200.7) + way * direction;
+            WoodShot shot = shaken(seed++);
+            shot.displacement = crack_field(truth, one.angle, one.opening, 0.2 * one.opening, {0.4, -0.3});
+            const CrackTip tip = tracker.tip(camera.take(shot));
+            ASSERT_EQ(tip.status, TipStatus::ok) << one.what << " " << way;
+            const Vec2 error = tip.tip - truth;
+            const double along = error.dot(direction);
+            std::printf("%-20s tip at %4.0f %4.0f: off by %5.2f px along, %5.2f px across, said %.2f px\n", one.what, truth.x(), truth.y(), along,
+                        direction.x() * error.y() - direction.y() * error.x(), tip.sigma);
+            EXPECT_LT(error.norm(), one.worst) << one.what << " " << way;
+            sum += along;
+            squares += std::pow(along / tip.sigma, 2);
+            ++count;
+        }
+        EXPECT_LT(std::abs(sum / 3), one.mean) << one.what;
+    }
+    std::printf("root mean square of error over sigma: %.2f in %d pictures\n", std::sqrt(squares / count), count);
+    EXPECT_LT(std::sqrt(squares / count), 2);
+}
+
+}  // namespace
+
+// Bars: a few pixels, unbiased. Where the crack is 0.8 px wide at 100 px behind its tip, the last 15 px are less than 0.3 px wide: there the
+// bar is that.
+TEST(VerificationGrayTrack, TipsOfCracksInWood) {
+    expect_tips({{"across rings", 0, 3, 60, {-2000, 200}, 5, 2}, {"across, hardly open", 0, 0.8, 60, {-2000, 200}, 15, 5}});
+}
+
+TEST(SlowGrayTrack, TipsOfMoreCracksInWood) {
+    expect_tips({{"across, wide", 0.1, 12, 60, {-2000, 200}, 5, 2},
+                 {"along rings", 0.05, 3, 60, {240, -3000}, 5, 2},
+                 {"along, wide", 0, 10, 90, {240, -3000}, 5, 2.5},
+                 {"oblique", 2.6, 3, 70, {-1500, -1500}, 5, 2},
+                 {"from above", 1.57, 2, 50, {-2000, 200}, 5, 2}});
+}
+
+TEST(VerificationGrayTrack, NoneWhereThereIsNoCrack) {
+    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10);
+    const GrayTracker tracker(camera.take({}), {});
+    EXPECT_EQ(tracker.tip(camera.take({.seed = 7})).status, TipStatus::no_crack);
+    EXPECT_EQ(tracker.tip(camera.take(shaken(8))).status, TipStatus::no_crack);
+    for (const PlaneField& field : {polynomial_field({240, 200}, {0.01, 0.005, 0, 0, 0}, {-0.01, -0.004, 0, 0, 0}, {0.3, 0.4}),
+                                    polynomial_field({240, 200}, {0.01, 0, 1e-5, -2e-5, 0}, {0, -0.01, 2e-5, 0, 1e-5})}) {
+        WoodShot shot = shaken(9);
+        shot.displacement = field.displacement;
+        EXPECT_EQ(tracker.tip(camera.take(shot)).status, TipStatus::no_crack);
+    }
+}
+
+TEST(VerificationGrayTrack, AnotherPictureIsNotLinedUp) {
+    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10), other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
+    EXPECT_NE(GrayTracker(camera.take({}), {}).tip(other.take({})).status, TipStatus::ok);
+}
+
+// Openings with noise, their start known.
+TEST(VerificationGrayTrack, OpeningOfAnyShapeBeginsWhereItDoes) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise(0, 0.1);
+    for (const double power : {0.0, 0.5, 1.0, 1.5})
+        for (const double truth : {50.0, 80.3}) {
+            OpeningProfile profile;
+            for (int i = 0; i < 140; ++i) {
+                const double r = truth - i;
+                profile.opening.push_back((r > 0 ? 3 * std::pow(r / 80, power) : 0) + noise(random));
+                profile.along.push_back(0);
+                profile.across.push_back(0);
+            }
+            profile.opening[30] += 5;  // an outlier
+            const auto start = find_opening_start(profile);
+            ASSERT_TRUE(start) << power;
+            std::printf("power %.1f: off by %.2f px, said %.2f px\n", power, start->place - truth, start->sigma);
+            EXPECT_LT(std::abs(start->place - truth), 3 * start->sigma + 0.5) << power;
+        }
+    OpeningProfile flat{std::vector<double>(140), std::vector<double>(140), std::vector<double>(140)};
+    for (double& value : flat.opening)
+        value = noise(random);
+    EXPECT_FALSE(find_opening_start(flat));
+    EXPECT_FALSE(find_opening_start({{1, 0}, {0, 0}, {0, 0}}));
+}
