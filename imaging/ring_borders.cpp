@@ -40,14 +40,15 @@ cv::Mat running_means(const cv::Mat& values, double sigma) {
 /// Gaussian along the rows; nothing beyond their ends.
 cv::Mat blur_along(const cv::Mat& values, double sigma) {
     constexpr int band = 32;  // rows at a time: they stay in the cache
+    const int size = 2 * static_cast<int>(std::ceil(3 * sigma)) + 1;
     cv::Mat out(values.size(), CV_32F);
     cv::parallel_for_({0, (values.rows + band - 1) / band}, [&](const cv::Range& bands) {
         for (int i = bands.start; i < bands.end; ++i) {
             const cv::Range rows(band * i, std::min(values.rows, band * (i + 1)));
             cv::Mat blurred;
             if (sigma < 8)
-                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * sigma)) + 1, sigma, CV_32F),
-                                cv::Mat::ones(1, 1, CV_32F), {-1, -1}, 0, cv::BORDER_CONSTANT);
+                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
+                                {-1, -1}, 0, cv::BORDER_CONSTANT);
             else
                 blurred = running_means(values.rowRange(rows).clone(), sigma);
             blurred.copyTo(out.rowRange(rows));

@@ -23,7 +23,7 @@ namespace {
 
 constexpr double least_coherency = 0.25;     // of the picture; noise has some 0.1
 constexpr int least_side = 16;               // pixels
-constexpr std::size_t most_pixels = 1 << 26; // some forty bytes are needed for each
+constexpr std::size_t most_pixels = 1 << 26; // some hundred bytes are needed for each
 
 /// Gray and colour as float, the brightest value 1.
 struct Pixels {
