@@ -66,8 +66,9 @@ struct UnevenCells::Local {
     Eigen::Vector3d s;                                           // slope of the energy by strain
     Vec2 t;                                                      // by d
     double moment = 0;                                           // by the turn, which takes left_of(d) from d
-    Eigen::Matrix<double, 6, 1> force;
-    Eigen::Matrix<double, 6, 8> rates;                           // from displacements
+    Eigen::Vector4d p;                                           // by R^T dF
+    Mat2 turn = Mat2::Identity();
+    std::array<Vec2, 4> slope;                                   // of the nodes' shape functions [1/m]
 };
 
 UnevenCells::Local UnevenCells::local(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const {
@@ -75,23 +76,22 @@ UnevenCells::Local UnevenCells::local(const Piece& piece, const Unevenness& wood
     const Vec2 cell = layout.cell;
     const double share = static_cast<double>((piece.box.to_x - piece.box.from_x) * (piece.box.to_y - piece.box.from_y)) / layout.points_per_cell();
     const double x = 0.5 * (piece.box.from_x + piece.box.to_x) / layout.per_side, y = 0.5 * (piece.box.from_y + piece.box.to_y) / layout.per_side;
-    const std::array<Vec2, 4> slope{Vec2((y - 1.0) / cell.x(), (x - 1.0) / cell.y()), Vec2((1.0 - y) / cell.x(), -x / cell.y()),
-                                    Vec2(-y / cell.x(), (1.0 - x) / cell.y()), Vec2(y / cell.x(), x / cell.y())};
-    const auto node = body_.points.node[piece.point];
     Local at;
+    at.slope = {Vec2((y - 1.0) / cell.x(), (x - 1.0) / cell.y()), Vec2((1.0 - y) / cell.x(), -x / cell.y()),
+                Vec2(-y / cell.x(), (1.0 - x) / cell.y()), Vec2(y / cell.x(), x / cell.y())};
+    const auto node = body_.points.node[piece.point];
     at.S = share * layout.thickness * cell.prod() * wood.stretch;
     at.G = share * layout.thickness * wood.coupling;
     at.H = share * layout.thickness / cell.prod() * wood.bending;
     Mat2 gradient = Mat2::Zero();
     Vec2 across = Vec2::Zero();
     for (int k = 0; k < 4; ++k) {
-        gradient += displacement[node[k]] * slope[k].transpose();
+        gradient += displacement[node[k]] * at.slope[k].transpose();
         across += crosswise_sign[k] * displacement[node[k]];
     }
-    Mat2 turn = Mat2::Identity();
     if (rotates_) {
         const Polar polar(gradient);
-        turn = polar.turn;
+        at.turn = polar.turn;
         at.trace = polar.trace;
         at.strain << polar.stretch(0, 0) - 1.0, polar.stretch(1, 1) - 1.0, 2.0 * polar.stretch(0, 1);
         at.B = polar.strain_slope();
@@ -103,22 +103,21 @@ UnevenCells::Local UnevenCells::local(const Piece& piece, const Unevenness& wood
         at.strain << gradient(0, 0), gradient(1, 1), gradient(0, 1) + gradient(1, 0);
         at.B << 1, 0, 0, 0, 0, 0, 0, 1, 0, 1, 1, 0;
     }
-    at.d = turn.transpose() * across;
+    at.d = at.turn.transpose() * across;
     at.s = at.S * at.strain + at.G * at.d;
     at.t = at.G.transpose() * at.strain + at.H * at.d;
     at.moment = -at.t.dot(left_of(at.d));
-    at.force << at.B.transpose() * at.s + at.moment * at.spin.transpose(), at.t;
-    for (int k = 0; k < 4; ++k) {
-        at.rates.block<2, 2>(0, 2 * k) = slope[k] * turn.col(0).transpose();
-        at.rates.block<2, 2>(2, 2 * k) = slope[k] * turn.col(1).transpose();
-        at.rates.block<2, 2>(4, 2 * k) = crosswise_sign[k] * turn.transpose();
-    }
+    at.p = at.B.transpose() * at.s + at.moment * at.spin.transpose();
     return at;
 }
 
 UnevenCells::State UnevenCells::state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const {
     const Local at = local(piece, wood, displacement);
-    return {0.5 * (at.s.dot(at.strain) + at.t.dot(at.d)), at.rates.transpose() * at.force};
+    const Mat2 P = at.turn * (Mat2() << at.p[0], at.p[1], at.p[2], at.p[3]).finished();
+    const Vec2 pull = at.turn * at.t;
+    State state{0.5 * (at.s.dot(at.strain) + at.t.dot(at.d)), {}};
+    for (int k = 0; k < 4; ++k) state.force.segment<2>(2 * k) = P * at.slope[k] + crosswise_sign[k] * pull;
+    return state;
 }
 
 Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::vector<Vec2>& displacement, bool geometric) const {
@@ -135,7 +134,7 @@ Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::
         const double difference = (at.s[1] - at.s[0]) / at.trace, twice = 2.0 * at.s[2] / at.trace;
         const Eigen::RowVector4d d_u(1.0 - at.u, -at.w, at.w, -at.u), d_v(-at.v, at.w, -at.w, 1.0 - at.v), d_w(-at.w, at.u, at.v, -at.w);
         const Vec2 t_turned = left_of(at.t);
-        const Eigen::Vector4d p = at.force.head<4>(), p_turned(-p[2], -p[3], p[0], p[1]);
+        const Eigen::Vector4d p_turned(-at.p[2], -at.p[3], at.p[0], at.p[1]);
         second.row(1).head<4>() += difference * d_w + twice * d_u;
         second.row(2).head<4>() += twice * d_v - difference * d_w;
         second.topLeftCorner<4, 4>() += p_turned * at.spin - at.t.dot(at.d) * at.spin.transpose() * at.spin -
@@ -143,7 +142,13 @@ Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::
         second.topRightCorner<4, 2>() += at.spin.transpose() * t_turned.transpose();
         second.bottomLeftCorner<2, 4>() += t_turned * at.spin;
     }
-    return at.rates.transpose() * second * at.rates;
+    Eigen::Matrix<double, 6, 8> rates;  // from displacements
+    for (int k = 0; k < 4; ++k) {
+        rates.block<2, 2>(0, 2 * k) = at.slope[k] * at.turn.col(0).transpose();
+        rates.block<2, 2>(2, 2 * k) = at.slope[k] * at.turn.col(1).transpose();
+        rates.block<2, 2>(4, 2 * k) = crosswise_sign[k] * at.turn.transpose();
+    }
+    return rates.transpose() * second * rates;
 }
 
 } // namespace crampfit
