@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <random>
 #include <sstream>
@@ -18,11 +19,12 @@ const std::string script = SAMPLES "/../../scripts/virtual_wedges";
 
 /// What the script says of the tests; files stay in the command's folder.
 std::string virtual_wedges(Command& command, const std::string& options) {
-    const std::string words = script + " --crampfit " COMMAND " --keep " + command.path(".").string() + " " + options + " > " +
-                              command.path("told.txt").string() + " 2>&1";
+    const std::string words = script + " --crampfit " COMMAND " --keep " + command.path(".") + " " + options + " > " +
+                              command.path("told.txt") + " 2>&1";
     EXPECT_EQ(std::system(words.c_str()), 0);
     const std::string told = command.folder.read("told.txt");
     std::printf("%s", told.c_str());
+    std::fflush(stdout);  // before the next fork
     return told;
 }
 
