@@ -57,12 +57,10 @@ TEST(SlowVirtualWedges, TwentyLinearTests) {
 
 TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     Command command;
-    for (const char* scene : {"opened", "joint"}) {
-        const std::string told = virtual_wedges(command, std::string("--count 1 --starts 20 --scene ") + scene);
-        const double same = after(told, "of 20 random starts ");
-        EXPECT_GE(same, 1);
-        EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
-    }
+    const std::string told = virtual_wedges(command, "--count 1 --starts 20 --scene opened");
+    const double same = after(told, "of 20 random starts ");
+    EXPECT_GE(same, 1);
+    EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
 TEST(SlowVirtualWedges, WedgeAndTensileTestGiveFourParameters) {
