@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <random>
 #include <sstream>
@@ -18,11 +19,12 @@ const std::string script = SAMPLES "/../../scripts/virtual_wedges";
 
 /// What the script says of the tests; files stay in the command's folder.
 std::string virtual_wedges(Command& command, const std::string& options) {
-    const std::string words = script + " --crampfit " COMMAND " --keep " + command.path(".").string() + " " + options + " > " +
-                              command.path("told.txt").string() + " 2>&1";
+    const std::string words = script + " --crampfit " COMMAND " --keep " + command.path(".") + " " + options + " > " +
+                              command.path("told.txt") + " 2>&1";
     EXPECT_EQ(std::system(words.c_str()), 0);
     const std::string told = command.folder.read("told.txt");
     std::printf("%s", told.c_str());
+    std::fflush(stdout);  // before the next fork
     return told;
 }
 
@@ -43,33 +45,22 @@ std::string without_seconds(const std::string& table) {
 
 }  // namespace
 
-// Of intervals that hold the truth 95 times in a hundred, seven or fewer of ten do once in a hundred times (binomial: 0.0115).
-TEST(SlowVirtualWedges, TenLinearTests) {
+// Of intervals that hold the truth 95 times in a hundred, 15 or fewer of twenty do three times in a thousand (binomial: 0.0026).
+TEST(SlowVirtualWedges, TwentyLinearTests) {
     Command command;
-    const std::string told = virtual_wedges(command, "--scene opened --count 10");
+    const std::string told = virtual_wedges(command, "--scene opened --count 20");
     for (const char* key : {"EW.toughness", "LW.toughness"}) {
         EXPECT_LT(after(told, std::string(key) + ": median error "), 2);
-        EXPECT_GE(after(told.substr(told.rfind(std::string(key) + ": median")), "covered "), 8);
+        EXPECT_GE(after(told.substr(told.rfind(std::string(key) + ": median")), "covered "), 16);
     }
 }
 
 TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     Command command;
-    for (const char* scene : {"opened", "joint"}) {
-        const std::string told = virtual_wedges(command, std::string("--count 1 --starts 20 --scene ") + scene);
-        const double same = after(told, "of 20 random starts ");
-        EXPECT_GE(same, 1);
-        EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
-    }
-}
-
-TEST(SlowVirtualWedges, WedgeAndTensileTestGiveFourParameters) {
-    Command command;
-    const std::string told = virtual_wedges(command, "--scene joint --count 1");
-    for (const char* key : {"EW.toughness", "LW.toughness", "EW.E", "LW.E"}) {
-        EXPECT_LT(after(told, std::string(key) + ": median error "), 5);
-        EXPECT_EQ(after(told.substr(told.rfind(std::string(key) + ": median")), "covered "), 1);
-    }
+    const std::string told = virtual_wedges(command, "--count 1 --starts 20 --scene opened");
+    const double same = after(told, "of 20 random starts ");
+    EXPECT_GE(same, 1);
+    EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
 // Wheels: each equilibrium is found from those before it.
