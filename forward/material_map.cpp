@@ -5,7 +5,6 @@
 
 #include "datasets/error.hpp"
 
-#include <Eigen/QR>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -192,7 +191,7 @@ const LocalWood* MaterialMap::band_around(const Vec2& centre, const Vec2& half) 
 // nothing of it between (4 degrees too little for an edge that runs 10 degrees off the pixels).
 Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
     if (!scene_.specimen.map) return radial_direction(centre);
-    constexpr int reach = 5;       // of the smoothing, in samples
+    constexpr int reach = 7;       // of the smoothing, in samples
     constexpr double width = 2.0;  // standard deviation of its Gaussian, in samples
     const Specimen& map = *scene_.specimen.map;
     const double spacing = std::max(half.maxCoeff() / 8.0, map.pixel);
@@ -314,45 +313,39 @@ Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const L
     if (std::all_of(wood.begin(), wood.end(), is_average)) return {};
     Coefficients mean = Coefficients::Zero();
     for (const Coefficients& c : wood) mean += c / static_cast<double>(wood.size());
-    // All in the axes n, s of the layers: strain is counted nn, ss, 2 ns. From e_nn = a s_nn + c s_ns - r e_ss, e_ns alike, the strain
-    // jumps with a s_nn, b s_ns, r e_ss and so on: three amplitudes.
+    // All in the axes n, s of the layers; strain is counted nn, ss, 2 ns.
     Eigen::Matrix3d turn;  // of strain, from x, y
     const double nx = normal.x(), ny = normal.y();
     turn << nx * nx, ny * ny, nx * ny, ny * ny, nx * nx, -nx * ny, -2.0 * nx * ny, 2.0 * nx * ny, nx * nx - ny * ny;
-    const Eigen::Matrix3d average_stiffness = LayeredElasticity{of_average, Vec2::UnitX()}.stiffness();
-    Eigen::Matrix3d jump_jump = Eigen::Matrix3d::Zero(), jump_mean = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 2> jump_bend = Eigen::Matrix<double, 3, 2>::Zero();
-    Unevenness found;
+    const Eigen::Matrix3d C = LayeredElasticity{mean, Vec2::UnitX()}.stiffness();
+    const Eigen::Matrix3d more = C - LayeredElasticity{of_average, Vec2::UnitX()}.stiffness();
+    Eigen::RowVector2d stretch = Eigen::RowVector2d::Zero();       // mean of E' b, with b q the strain e_ss of q
+    Eigen::Matrix2d contraction = Eigen::Matrix2d::Zero();         // means of r b and p b
+    Eigen::Matrix2d bending = Eigen::Matrix2d::Zero();
     for (int k = 0; k < samples * samples; ++k) {
         const double x = spread.x() * half.x() * ((2.0 * (k % samples) + 1.0) / samples - 1.0);
         const double y = spread.y() * half.y() * ((2.0 * (k / samples) + 1.0) / samples - 1.0);
-        Eigen::Matrix<double, 3, 2> bend;  // strain of q
-        bend << y, 0, 0, x, x, y;
-        bend = turn * bend;
-        const Eigen::Matrix3d C = LayeredElasticity{wood[k], Vec2::UnitX()}.stiffness();
-        const Coefficients d = wood[k] - mean;
-        Eigen::Matrix3d jump;
-        jump << d[2] / mean[2], d[5] / mean[3], d[1], 0, 0, 0, d[5] / mean[2], d[3] / mean[3], d[4];
-        jump_jump += jump.transpose() * C * jump;
-        jump_mean += jump.transpose() * C;
-        jump_bend += jump.transpose() * C * bend;
-        found.coupling += C * bend;
-        found.bending += bend.transpose() * (C - average_stiffness) * bend;
+        Eigen::Matrix<double, 3, 2> strain;  // of q
+        strain << y, 0, 0, x, x, y;
+        strain = turn * strain;
+        const Eigen::RowVector2d b = strain.row(1);
+        stretch += wood[k][0] * b;
+        contraction.row(0) += wood[k][1] * b;
+        contraction.row(1) += wood[k][4] * b;
+        bending += (wood[k][0] - mean[0]) * b.transpose() * b + strain.transpose() * more * strain;
     }
-    // Two woods jump in proportion, whatever the amplitude: of these the smallest will do.
-    const Eigen::Vector3d diagonal = jump_jump.diagonal().cwiseSqrt();
-    const double negligible = 1e-10 * std::max(diagonal.maxCoeff(), std::sqrt(of_average[0]));
-    const Eigen::Vector3d scale = (diagonal.array() > negligible).select(1.0 / diagonal.array(), 0.0);
-    const Eigen::Matrix3d scaled = scale.asDiagonal() * jump_jump * scale.asDiagonal();
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
-    solver.setThreshold(1e-9);
-    solver.compute(Eigen::MatrixXd(scaled));
-    const Eigen::Matrix<double, 3, 2> amplitude = scale.asDiagonal() * solver.solve(Eigen::MatrixXd(scale.asDiagonal() * jump_bend));
     const double share = 1.0 / (samples * samples);
-    found.coupling = share * turn.transpose() * (found.coupling - jump_mean.transpose() * amplitude);
-    found.bending = share * (found.bending - jump_bend.transpose() * amplitude);
-    const Eigen::Matrix3d more = LayeredElasticity{mean, Vec2::UnitX()}.stiffness() - average_stiffness;
-    if (more.norm() > 1e-12 * average_stiffness.norm()) found.stretch = turn.transpose() * more * turn;
+    contraction *= share;
+    Eigen::Matrix<double, 2, 3> tractions;  // nn and ns, of strain
+    tractions << C.row(0), C.row(2);
+    Eigen::Matrix<double, 3, 2> coupling = tractions.transpose() * contraction;
+    coupling.row(1) += share * stretch;
+    Eigen::Matrix2d stiffness;              // of the tractions' own strains
+    stiffness << C(0, 0), C(0, 2), C(2, 0), C(2, 2);
+    Unevenness found;
+    found.coupling = turn.transpose() * coupling;
+    found.bending = share * bending + contraction.transpose() * stiffness * contraction;
+    if (more.norm() > 1e-12 * C.norm()) found.stretch = turn.transpose() * more * turn;
     return found;
 }
 

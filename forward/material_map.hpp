@@ -45,10 +45,10 @@ class MaterialMap {
     /// area.
     LocalWood average(const Vec2& centre, const Vec2& half) const;
 
-    /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Strain adds to what the displacements
-    /// say a part that jumps between the layers as a laminate's does, has no mean, and makes the energy least (enhanced assumed
-    /// strain, Simo and Rifai 1990). Places count with their distance from the middle times `spread`, so that the points which
-    /// integrate the average have the same second moment.
+    /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Layers share the strain along them,
+    /// wherever they lie, and the tractions between them are those of the mean strain: the part that q stretches along the layers feels
+    /// the moments of E', r and p (`LayeredElasticity`), the rest the average. Places count with their distance from the middle times
+    /// `spread`, so that the points which integrate the average have the same second moment.
     Unevenness unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
 
     bool homogeneous() const { return homogeneous_; }

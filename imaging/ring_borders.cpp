@@ -31,10 +31,12 @@ cv::Mat running_means(const cv::Mat& values, double sigma) {
     const int narrow = 2 * static_cast<int>((std::sqrt(12 * sigma * sigma / means + 1) - 1) / 2) + 1;
     const double left = 12 * sigma * sigma - means * (narrow * narrow - 1.0);
     const auto wider = std::clamp(std::lround(left / (4.0 * narrow + 4)), 0l, static_cast<long>(means));
-    cv::Mat out = values;
+    const int beyond = means * (narrow / 2 + 1);  // what a mean puts beyond the ends comes back with the next
+    cv::Mat out;
+    cv::copyMakeBorder(values, out, 0, 0, beyond, beyond, cv::BORDER_CONSTANT, 0);
     for (int i = 0; i < means; ++i)
         cv::blur(out, out, {i < wider ? narrow + 2 : narrow, 1}, {-1, -1}, cv::BORDER_CONSTANT);
-    return out;
+    return out.colRange(beyond, beyond + values.cols);
 }
 
 /// Gaussian along the rows; nothing beyond their ends.
@@ -50,7 +52,7 @@ cv::Mat blur_along(const cv::Mat& values, double sigma) {
                 cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
                                 {-1, -1}, 0, cv::BORDER_CONSTANT);
             else
-                blurred = running_means(values.rowRange(rows).clone(), sigma);
+                blurred = running_means(values.rowRange(rows), sigma);
             blurred.copyTo(out.rowRange(rows));
         }
     });
