@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -83,8 +84,14 @@ struct Estimate {
     double at_finest;
     double power;
     double cells;
+    std::array<std::pair<double, double>, 2> seen;  // coarser grids' cells, and how far off these were
 
-    double at(double other_cells) const { return at_finest * std::pow(cells / other_cells, power); }
+    double at(double other_cells) const {
+        double error = at_finest * std::pow(cells / other_cells, power);
+        for (const auto& [seen_cells, seen_error] : seen)  // still fewer cells are no better, whatever the power says
+            if (other_cells <= seen_cells) error = std::max(error, seen_error);
+        return error;
+    }
 };
 
 // Of what all three grids know.
@@ -98,7 +105,9 @@ std::vector<Estimate> estimates_of(const Trial& coarse, const Trial& middle, con
         if (a == coarse.quantities.end() || b == middle.quantities.end() || q.value == 0.0) continue;
         const double first = std::abs((a->value - b->value) / q.value), second = std::abs((b->value - q.value) / q.value);
         const double power = second == 0.0 ? most_power : std::clamp(std::log2(first / second), least_power, most_power);
-        found.push_back({q.name, safety * second / (std::pow(2.0, power) - 1.0), power, fine.cells});
+        const double at_finest = safety * second / (std::pow(2.0, power) - 1.0);
+        const double coarse_off = std::abs(a->value / q.value - 1.0) + at_finest, middle_off = second + at_finest;
+        found.push_back({q.name, at_finest, power, fine.cells, {{{coarse.cells, coarse_off}, {middle.cells, middle_off}}}});
     }
     return found;
 }

@@ -180,7 +180,8 @@ TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
 }
 
 // The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness latewood
-// turns a crack away and out (`VerificationAlongRings`), and so it goes here.
+// turns a crack away and out (`VerificationAlongRings`), and so it goes here in motion; at equilibrium one in the middle of latewood
+// stays, as it has nothing to turn it.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const double outside = spent(run("tension_rt", speed, 0.1)).latewood();
@@ -188,7 +189,8 @@ TEST(SlowPaper, RtIsNotDrawnToLatewood) {
         std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, started in latewood %.0f %%\n", speed,
                     100 * outside, 100 * inside);
         EXPECT_LT(outside, 0.1);
-        EXPECT_LT(inside, 0.7);
+        if (speed == at_equilibrium) EXPECT_GT(inside, 0.7);
+        else EXPECT_LT(inside, 0.7);
     }
 }
 
