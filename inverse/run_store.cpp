@@ -127,21 +127,15 @@ Evaluation RunStore::at(const Eigen::VectorXd& values, const std::function<Evalu
             return known->second;
         }
     }
-    return again(values, run);
-}
-
-Evaluation RunStore::again(const Eigen::VectorXd& values, const std::function<Evaluation()>& run) {
-    const std::vector<double> key(values.begin(), values.end());
     const Evaluation evaluation = run();
     if (!evaluation.usable() && stop_ && *stop_) {
         return evaluation;
     }
-    const std::lock_guard lock(mutex_);
-    const auto [known, is_new] = known_.emplace(key, evaluation);
-    if (journal_ && is_new) {
+    if (journal_) {
         journal_->add(stored(key, evaluation));
     }
-    return known->second;
+    const std::lock_guard lock(mutex_);
+    return known_.emplace(key, evaluation).first->second;
 }
 
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {
