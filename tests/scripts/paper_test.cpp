@@ -180,8 +180,8 @@ TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
 }
 
 // The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness latewood
-// turns a crack away and out (`VerificationAlongRings`), and so it goes here in motion; at equilibrium one in the middle of latewood
-// stays, as it has nothing to turn it.
+// turns a crack away and out (`VerificationAlongRings`), and so it goes here in motion; at equilibrium one that starts in latewood
+// runs straight through the waving band and does not leave it.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const double outside = spent(run("tension_rt", speed, 0.1)).latewood();
