@@ -179,12 +179,12 @@ LocalWood Discretisation::wood_of_cell(const MaterialMap& materials, int c) cons
     return materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
 }
 
-Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box) const {
+Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box, const LocalWood& average) const {
     const Vec2 wide(box.to_x - box.from_x, box.to_y - box.from_y);
     const Vec2 half = 0.5 * wide.cwiseProduct(layout.point_size());
     const Vec2 centre = layout.cell_corner(c) + layout.point_size().cwiseProduct(Vec2(box.from_x, box.from_y)) + half;
     const Vec2 spread = (1.0 - wide.array().square().inverse()).sqrt();
-    return materials.unevenness(centre, half, wood_of_cell(materials, c), spread);
+    return materials.unevenness(centre, half, average, spread);
 }
 
 void Discretisation::place_points(const Scene& scene, const MaterialMap& materials) {
@@ -193,6 +193,8 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
     points.lattice.assign(static_cast<std::size_t>(columns) * layout.cells_y * layout.per_side, -1);
     points.first_of_cell.reserve(layout.cells() + 1);
     points.node = PointTable<int>(layout.nodes_per_cell());
+    const double whole = layout.cell.prod() * layout.thickness;
+    cell_is_full_.assign(layout.cells(), false);
     const Extent extent(scene.specimen);
     for (int c = 0; c < layout.cells(); ++c) {
         points.first_of_cell.push_back(points.count());
@@ -202,6 +204,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         const auto nodes = layout.cell_nodes(c);
         const int kind = kind_of_cell(c % layout.cells_x, layout.cells_x) + kinds_of_cells * kind_of_cell(c / layout.cells_x, layout.cells_y);
         const int first_slot = layout.degree == 1 ? 0 : kind * layout.points_per_cell();
+        double filled = 0.0;
         for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
             const int column = c % layout.cells_x * layout.per_side + slot % layout.per_side;
             const int row = c / layout.cells_x * layout.per_side + slot / layout.per_side;
@@ -221,19 +224,14 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
             else points.poisson_ratio.push_back(wood.poisson_ratios[0]);
             points.latewood.push_back(static_cast<float>(wood.latewood));
             if (!scene.specimen.parts.empty()) points.part.push_back(part_at(scene.specimen.parts, x));
+            filled += points.volume.back();
         }
+        cell_is_full_[c] = filled > (1.0 - 1e-9) * whole;
+        if (!cell_is_full_[c] || !wood.mixed || layout.degree > 1) continue;
+        const Unevenness uneven = unevenness_of(materials, c, {0, 0, layout.per_side, layout.per_side}, wood);
+        if (!uneven.isZero()) uneven_cells.push_back({c, uneven});
     }
     points.first_of_cell.push_back(points.count());
-    const double whole = layout.cell.prod() * layout.thickness;
-    cell_is_full_.assign(layout.cells(), false);
-    for (int c = 0; c < layout.cells(); ++c) {
-        double filled = 0.0;
-        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) filled += points.volume[p];
-        cell_is_full_[c] = filled > (1.0 - 1e-9) * whole;
-        if (!cell_is_full_[c] || layout.degree > 1 || materials.homogeneous()) continue;
-        const Unevenness wood = unevenness_of(materials, c, {0, 0, layout.per_side, layout.per_side});
-        if (!wood.isZero()) uneven_cells.push_back({c, wood});
-    }
 }
 
 // Parts that share a node would move together there.

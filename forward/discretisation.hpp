@@ -154,7 +154,7 @@ class Discretisation {
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     int point_at(const Vec2& x) const;                 // the point whose domain holds x, or -1
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;  // on average
-    Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box) const;  // of a piece of a full cell
+    Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box, const LocalWood& average) const;  // a piece of a full cell
     int neighbour(int p, int step_x, int step_y) const;  // the point that many places away, or -1
 
     /// Calls `visit(c)` for every cell that a square of half width `reach` about x touches.

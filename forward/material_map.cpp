@@ -281,7 +281,8 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (sum.filled == 0.0) return sum;
     const double share = 1.0 / sum.filled;  // means over what is there; the void only thins the point
     sum.elasticity.coefficients *= share;
-    const std::optional<Vec2> normal = least < most ? std::optional(layer_normal(centre, half)) : std::nullopt;
+    sum.mixed = least < most;
+    const std::optional<Vec2> normal = sum.mixed ? std::optional(layer_normal(centre, half)) : std::nullopt;
     if (orthotropic_) average_elasticity(elasticities, samples, normal, sum.elasticity);
     else if (normal) sum.elasticity.normal = *normal;
     sum.density *= share;
@@ -293,8 +294,7 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
 }
 
 Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
-    const LocalWood* band = band_around(centre, half);
-    if (homogeneous_ || average.filled < 1.0 || (band && band->elasticity.coefficients == average.elasticity.coefficients)) return {};
+    if (!average.mixed || average.filled < 1.0) return {};
     using Coefficients = LayeredElasticity::Coefficients;
     const int samples = samples_a_side(half);
     const Vec2 normal = average.elasticity.normal;

@@ -12,6 +12,7 @@ struct LocalWood {
     Vec2 poisson_ratios = Vec2::Zero();  // stress out of the plane, in plane strain, per stress along the normal and the layers
     double filled = 0;           // share of the area that is not void
     double latewood = 0;         // 0 first material .. 1 last, for pictures
+    bool mixed = false;          // an average over more than one wood
     int material = -1;           // its number; -1: transition wood, or an average
 
     /// E' = E in plane stress, E / (1 - nu^2) in plane strain, along the layers [Pa].

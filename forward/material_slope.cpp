@@ -42,7 +42,8 @@ MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const D
 const Unevenness& MaterialSlope::unevenness(int cell, const PointBox& box) const {
     const auto known = unevenness_.find({cell, box});
     if (known != unevenness_.end()) return known->second;
-    const Unevenness more = body_->unevenness_of(more_->materials, cell, box), less = body_->unevenness_of(less_->materials, cell, box);
+    const auto of = [&](const MaterialMap& materials) { return body_->unevenness_of(materials, cell, box, body_->wood_of_cell(materials, cell)); };
+    const Unevenness more = of(more_->materials), less = of(less_->materials);
     const double span = 2.0 * step_;
     return unevenness_[{cell, box}] = {(more.stretch - less.stretch) / span, (more.coupling - less.coupling) / span,
                                        (more.bending - less.bending) / span};

@@ -15,7 +15,8 @@ const Unevenness& UnevenCells::wood_of(const Discretisation::UnevenCell& cell, c
     if (box == PointBox{0, 0, side, side}) return cell.wood;
     const auto known = cut_.find({cell.cell, box});
     if (known != cut_.end()) return known->second;
-    return cut_.emplace(std::pair(cell.cell, box), body_.unevenness_of(materials_, cell.cell, box)).first->second;
+    const LocalWood average = body_.wood_of_cell(materials_, cell.cell);
+    return cut_.emplace(std::pair(cell.cell, box), body_.unevenness_of(materials_, cell.cell, box, average)).first->second;
 }
 
 void UnevenCells::sort() {
