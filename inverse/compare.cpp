@@ -25,6 +25,15 @@ FitOptions options_of(const Study& study, std::size_t number, FitOptions options
     return options;
 }
 
+// The part of -2 ln L that says how sharply a model speaks.
+double spread(const Fit& fit) {
+    double sum = 0;
+    for (const FitResidual& residual : fit.residuals) {
+        sum += 2 * std::log(residual.sigma);
+    }
+    return sum;
+}
+
 ComparedModel compared(const std::string& model, const Fit& fit) {
     ComparedModel row;
     row.name = model;
@@ -37,12 +46,14 @@ ComparedModel compared(const std::string& model, const Fit& fit) {
 }
 
 // All models have the same data and parameters.
-void weigh(std::vector<ComparedModel>& models, double unexplained, std::size_t points) {
+void weigh(std::vector<ComparedModel>& models, const std::vector<double>& spreads, double unexplained, std::size_t points) {
     const auto k = static_cast<double>(models.front().values.size());
     double least = std::numeric_limits<double>::infinity(), sum = 0;
-    for (ComparedModel& model : models) {
-        model.aic = model.misfit / unexplained + 2 * k;
-        model.bic = model.misfit / unexplained + k * std::log(static_cast<double>(std::max<std::size_t>(1, points)));
+    for (std::size_t i = 0; i < models.size(); ++i) {
+        ComparedModel& model = models[i];
+        const double deviance = model.misfit / unexplained + spreads[i];
+        model.aic = deviance + 2 * k;
+        model.bic = deviance + k * std::log(static_cast<double>(std::max<std::size_t>(1, points)));
         least = std::min(least, model.aic);
     }
     for (ComparedModel& model : models) {
@@ -73,19 +84,25 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     Fit best;
     std::vector<ComparedModel> models;
+    std::vector<double> spreads;  // beyond that of the sharpest model
     double unexplained = std::numeric_limits<double>::infinity(), seconds = 0;
     bool interrupted = false;
     for (std::size_t i = 0; i < study.models.size() && !interrupted; ++i) {
         Fit fit = fit_study(model_of(study, i), options_of(study, i, options));
         models.push_back(compared(study.models[i].name, fit));
+        spreads.push_back(fit.residuals.empty() ? std::numeric_limits<double>::infinity() : spread(fit));
         unexplained = std::min(unexplained, fit.reduced_chi_square);
         seconds += fit.seconds;
         interrupted = fit.status == FitStatus::interrupted;
-        if (i == 0 || fit.misfit < best.misfit) {
+        if (i == 0 || fit.misfit + spreads.back() < best.misfit + spread(best)) {
             best = std::move(fit);
         }
     }
-    weigh(models, std::max(1.0, unexplained), best.residuals.size());
+    const double sharpest = *std::min_element(spreads.begin(), spreads.end());
+    for (double& beyond : spreads) {
+        beyond = std::isfinite(beyond) ? beyond - sharpest : 0.0;
+    }
+    weigh(models, spreads, std::max(1.0, unexplained), best.residuals.size());
     if (models.size() > 1) {
         best.message = fmt::format("{} \"{}\" explains the data best, with {:.2g} of the evidence; next \"{}\" with {:.2g}. {}",
                                    study.compared_key, models[0].name, models[0].weight, models[1].name, models[1].weight, best.message);

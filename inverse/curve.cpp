@@ -19,12 +19,22 @@ Curve::Curve(std::span<const double> x, std::span<const double> y) {
     assert(!rows.empty());
     std::stable_sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
     for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
-        double sum = 0;
         while (end < rows.size() && x[rows[end]] == x[rows[begin]]) {
-            sum += y[rows[end++]];
+            ++end;
         }
+        const auto mean = [&](std::size_t from, std::size_t to) {
+            double sum = 0;
+            for (std::size_t i = from; i < to; ++i) {
+                sum += y[rows[i]];
+            }
+            return sum / static_cast<double>(to - from);
+        };
         x_.push_back(x[rows[begin]]);
-        y_.push_back(sum / static_cast<double>(end - begin));
+        y_.push_back(mean(begin, begin + (end - begin + 1) / 2));
+        if (end > begin + 1) {
+            x_.push_back(std::nextafter(x_.back(), INFINITY));
+            y_.push_back(mean(begin + (end - begin) / 2, end));
+        }
     }
     integrate();
 }
@@ -60,7 +70,8 @@ double Curve::area(double x) const {
 }
 
 double Curve::mean(double from, double to) const {
-    return to > from ? (area(to) - area(from)) / (to - from) : at(from);
+    constexpr double narrow = 1e-9;  // of the curve: there a difference of areas is all rounding
+    return to - from > narrow * (x_.back() - x_.front()) ? (area(to) - area(from)) / (to - from) : 0.5 * (at(from) + at(to));
 }
 
 int Curve::count(double from, double to) const {

@@ -87,33 +87,36 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
     return result;
 }
 
-void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertainty, const Exploration& exploration) {
+void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty, const Exploration& exploration) {
     fit.message += exploration.message;
     for (std::size_t j = 0; j < exploration.profiles.size(); ++j) {
         const auto k = static_cast<Eigen::Index>(j);
         const Profile& profile = exploration.profiles[j];
         FittedParameter& parameter = fit.parameters[j];
-        const double factor = box.parameters()[j].unit_factor;
+        const auto value_at = [&](double y) {
+            return box.value(k, window.low[k] + y * window.width()[k]) / box.parameters()[j].unit_factor;
+        };
         for (std::size_t i = 0; i < profile.x.size(); ++i) {
-            fit.profile.push_back({parameter.name, box.value(k, profile.x[i]) / factor, profile.misfit[i]});
+            fit.profile.push_back({parameter.name, value_at(profile.x[i]), profile.misfit[i]});
         }
         const double least = *std::min_element(profile.misfit.begin(), profile.misfit.end());
         const auto [lower, upper] = interval(profile, least, rise_of(uncertainty));
         // The model's own scatter, which no profile of it shows, comes on top.
         const double x = uncertainty.best.x[k];
         const double own = uncertainty.quantile * std::sqrt(uncertainty.model_variance[k]);
-        parameter.lower_95 = box.value(k, std::max(0.0, x - std::hypot(x - lower, own))) / factor;
-        parameter.upper_95 = box.value(k, std::min(1.0, x + std::hypot(upper - x, own))) / factor;
+        parameter.lower_95 = value_at(std::max(0.0, x - std::hypot(x - lower, own)));
+        parameter.upper_95 = value_at(std::min(1.0, x + std::hypot(upper - x, own)));
         if (lower == 0.0 || upper == 1.0) {
-            fit.message += fmt::format("The data do not bound '{}' {} within its bounds. ", parameter.name,
-                                       lower > 0.0 ? "above" : upper < 1.0 ? "below" : "above or below");
+            fit.message += fmt::format("The data do not bound '{}' {} within {}. ", parameter.name,
+                                       lower > 0.0 ? "above" : upper < 1.0 ? "below" : "above or below",
+                                       window.low[k] > 0.0 || window.high[k] < 1.0 ? "many standard errors" : "its bounds");
         }
     }
-    if (!exploration.profiles.empty()) {
+    if (!exploration.profiles.empty() && fit.message.find("profile likelihood") == std::string::npos) {
         fit.message += "The intervals are those of the profile likelihood. ";
     }
     for (const Run& sample : exploration.posterior.samples) {
-        fit.posterior.push_back({in_units(box, sample.x), sample.evaluation->misfit});
+        fit.posterior.push_back({in_units(box, window.inside(sample.x)), sample.evaluation->misfit});
     }
 }
 

@@ -7,6 +7,7 @@
 #include "inverse/profile.hpp"
 #include "inverse/uncertainty.hpp"
 #include "inverse/unit_box.hpp"
+#include "inverse/window.hpp"
 
 #include <functional>
 #include <string>
@@ -27,7 +28,8 @@ struct Exploration {
 Exploration explore(Objective& objective, const Uncertainty& uncertainty, const UncertaintyChoice& choice, int data_residuals,
                     bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage);
 
-/// Puts profile intervals in the place of those of the covariance, and fills in the tables.
-void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertainty, const Exploration& exploration);
+/// Puts profile intervals in the place of those of the covariance, and fills in the tables. Uncertainty and exploration are those of
+/// a window of the box.
+void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty, const Exploration& exploration);
 
 }  // namespace crampfit

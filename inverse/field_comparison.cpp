@@ -24,8 +24,8 @@ double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
 }
 
 // A small motion of the whole picture: a translation, and a turn about the origin.
-Eigen::Matrix<double, 2, 3> motion_at(const Vec2& place) {
-    Eigen::Matrix<double, 2, 3> rows;
+Eigen::MatrixXd motion_at(const Vec2& place) {
+    Eigen::MatrixXd rows(2, 3);
     rows << 1, 0, -place.y(), 0, 1, place.x();
     return rows;
 }
@@ -101,16 +101,15 @@ std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, co
 }
 
 void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(3, 3);  // of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(3);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto rows = motion_at(places_[points[i].place] / reach_);
         const double weight = std::pow(share[i] / points[i].sigma, 2);
         normal += weight * rows.transpose() * rows;
         right += weight * rows.transpose() * (points[i].measured - values[i]);
     }
-    const Eigen::MatrixXd system = normal;  // of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end
-    const Eigen::VectorXd motion = system.completeOrthogonalDecomposition().solve(Eigen::VectorXd(right));
+    const Eigen::VectorXd motion = normal.completeOrthogonalDecomposition().solve(right);
     for (std::size_t i = 0; i < points.size(); ++i) {
         values[i] += motion_at(places_[points[i].place] / reach_) * motion;
     }

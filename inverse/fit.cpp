@@ -1,6 +1,7 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "inverse/close_look.hpp"
 #include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/explore.hpp"
@@ -26,6 +27,7 @@ namespace crampfit {
 namespace {
 
 constexpr double bound_tolerance = 1e-4;  // of the box
+constexpr int most_weighings = 4;         // by another resolution of the model
 constexpr int most_cheap_runs = 1000000;  // of those that take milliseconds
 
 using Clock = std::chrono::steady_clock;
@@ -162,11 +164,11 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const bool on_walks = by_walks || only_toughness;
     const bool in_order = on_walks && walks.depend_on_order();
     const Forward forward = !own ? options.forward : on_walks ? walks.exact() : walks.in_any_order();
-    const StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
+    StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
     const auto by_walk_of = [&](Forward (KeptWalks::*runs)(const std::vector<double>&) const) -> Near {
         return [&, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
             const Eigen::VectorXd values = model.box().values(point);
-            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), solver_resolution, options.stop_requested);
+            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), model.resolution(), options.stop_requested);
             return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
         };
     };
@@ -180,7 +182,11 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     Objective objective(
         box.size(), [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = box.values(x);
-            return store.at(values, [&] { return shared(values, share); });
+            // Runs that go on from one another are made again after a kill: without them the next ones would differ in their last digits.
+            const auto run = [&] { return shared(values, share); };
+            Evaluation evaluation = in_order ? store.again(values, run) : store.at(values, run);
+            model.weigh(evaluation, values);  // stored ones may have been weighed by another resolution
+            return evaluation;
         },
         study.optimizer.max_runs, in_order ? 1 : shared.places(), options.stop_requested,
         [&](const Run& run) { reporter.add(run); });
@@ -189,9 +195,24 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
-    const SearchResult found =
-        by_walks ? descend_by_walks(objective, near, by_walk_of(&KeptWalks::rough), study.optimizer.starts, box.initial(), options.seed, stage)
+    const Near rough = by_walk_of(&KeptWalks::rough);
+    SearchResult found =
+        by_walks ? descend_by_walks(objective, near, rough, study.optimizer.starts, box.initial(), options.seed, stage)
                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
+    for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
+        // How well the model knows what it says shows where it fits.
+        const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
+        if (std::abs(likely - model.resolution()) <= 0.1 * model.resolution()) {
+            break;
+        }
+        model.set_resolution(likely);
+        objective.judge_anew([&](const Run& run) {
+            Evaluation evaluation = *run.evaluation;
+            model.weigh(evaluation, box.values(run.x));
+            return evaluation;
+        });
+        found.converged = descend_again(objective, near, rough, options.seed);
+    }
     objective.set_budget_left(objective.budget_left() + reserve);
 
     Fit fit;
@@ -208,27 +229,14 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         for (const Parameter& parameter : study.parameters) {
             names.push_back(parameter.name);
         }
-        // Near the best point runs are cheap where the simulation has derivatives. Wide differences average over the kinks that jumps
-        // make; where those hide a slope, narrower ones see it.
-        std::optional<Objective> close;
-        const auto estimate_by_walks = [&] {
-            Uncertainty first;
-            for (const double step : {difference_step, 0.3 * difference_step, 0.1 * difference_step, 0.01 * difference_step, 0.003 * difference_step}) {
-                close.emplace(box.size(), near(objective.best()->x), most_cheap_runs, objective.threads(), options.stop_requested);
-                spread_about(*close, objective.best()->x, step, options.seed);
-                const Uncertainty here = estimate_uncertainty(*close, model.curve_lengths(), names, step);
-                const bool all_told = ((here.upper_95 - here.lower_95).array() < 1.0).all();
-                if (all_told) {
-                    return here;
-                }
-                if (step == difference_step) {
-                    first = here;
-                }
-            }
-            return first;
-        };
+        std::optional<CloseLook> close;  // where runs near the best one are cheap, as the simulation has derivatives
         const auto estimate = [&] {
-            return by_walks ? estimate_by_walks() : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
+            if (!by_walks) {
+                return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
+            }
+            const Eigen::VectorXd x = objective.best()->x;
+            close.emplace(look_close(objective, near(x), x, model.curve_lengths(), names, options.seed));
+            return close->uncertainty;
         };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
@@ -236,7 +244,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             }
             const bool cheap = own ? only_toughness || by_walks : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
-            return explore(close ? *close : objective, about, study.uncertainty, stations, cheap, options.seed, stage);
+            return explore(close ? close->objective : objective, about, study.uncertainty, stations, cheap, options.seed, stage);
         };
         Uncertainty uncertainty = estimate();
         Exploration exploration = look_around(uncertainty);
@@ -252,18 +260,22 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                      : found.converged   ? FitStatus::converged
                                          : FitStatus::run_limit;
         fit.message = explain(fit.status);
-        fill_parameters(fit, box, best.x, uncertainty);
+        fill_parameters(fit, box, best.x, close ? close->in_box() : uncertainty);
         fit.message += uncertainty.message;
         if (close && !only_toughness) {
             fit.message += "What is said of intervals rests on runs moved from the best one by its derivatives. ";
         }
-        fill_exploration(fit, box, uncertainty, exploration);
+        const Window whole(best.x, 1.0);
+        fill_exploration(fit, box, close ? close->window : whole, uncertainty, exploration);
         fit.misfit = best.evaluation->misfit;
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
         fit.distances = curve_distances(fit.residuals);
         fit.message += lack_of_fit(fit.checks) + model.remarks();
+        if (by_walks) {
+            fit.message += fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ", 100 * model.resolution());
+        }
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);

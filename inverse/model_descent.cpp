@@ -14,7 +14,7 @@ constexpr double first_radius = 0.12;
 constexpr double largest_radius = 0.3;
 constexpr double last_radius = difference_step;
 constexpr double least_step = 0.02 * difference_step;
-constexpr double least_gain = 1e-3;  // of the misfit
+constexpr double least_gain = 2e-4;  // of the misfit: of hundreds, a small part of what moves a parameter by one standard error
 constexpr int most_stalls = 2;       // steps at the last radius that gain nothing
 
 // A model of the runs about x; where they do not span all directions, after running the differences about it.

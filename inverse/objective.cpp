@@ -116,6 +116,18 @@ void Objective::join(const Objective& branch) {
     }
 }
 
+void Objective::judge_anew(const std::function<Evaluation(const Run&)>& judge) {
+    for (Run& run : runs_) {
+        run.evaluation = std::make_shared<const Evaluation>(judge(run));
+        const Key key(run.x.begin(), run.x.end());
+        known_[key] = run.evaluation;
+        std::promise<Shared::Result> done;
+        done.set_value(run.evaluation);
+        const std::lock_guard lock(shared_->memo_mutex);
+        shared_->memo[key] = done.get_future().share();
+    }
+}
+
 const Run* Objective::best() const {
     const Run* best = nullptr;
     for (const Run& run : runs_) {

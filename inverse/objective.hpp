@@ -52,6 +52,10 @@ class Objective {
     Objective branch(int budget, int threads) const;
     void join(const Objective& branch);
 
+    /// Puts what `judge` makes of each run in the place of what it was. Not while branches are at work; those made before keep what
+    /// they have.
+    void judge_anew(const std::function<Evaluation(const Run&)>& judge);
+
     Eigen::Index parameters() const { return parameters_; }
     const std::vector<Run>& runs() const { return runs_; }
     const Run* best() const;  // least misfit, the first of equals; null while no run was usable

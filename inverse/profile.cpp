@@ -12,7 +12,8 @@ namespace {
 constexpr int most_steps = 24;            // on a side
 constexpr double least_step = 0.002;      // of the box: below it, a run's own noise is all there is
 constexpr double largest_step = 0.1;      // of the box
-constexpr int runs_of_a_descent = 60;
+constexpr int runs_of_a_descent = 60;     // for each of the others
+constexpr int runs_across_kinks = 30;     // the same
 
 // x with its coordinate j left out, or put in.
 Eigen::VectorXd without(const Eigen::VectorXd& x, Eigen::Index j) {
@@ -37,8 +38,13 @@ std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& star
                 const auto there = objective.at(with(y, j, start[j]));
                 return there ? *there : Evaluation{"not run", {}, {}};
             },
-            runs_of_a_descent, 1);
+            runs_of_a_descent * static_cast<int>(start.size() - 1), 1);
         minimize_with_ceres(others, without(start, j));
+        if (others.best()) {  // across kinks, where slopes mislead
+            others.set_budget_left(runs_across_kinks * static_cast<int>(start.size() - 1));
+            const Eigen::VectorXd lowest = others.best()->x;
+            minimize(others, lowest, {"sbplx"});
+        }
         if (others.best()) {
             return Run{with(others.best()->x, j, start[j]), others.best()->evaluation};
         }

@@ -127,15 +127,21 @@ Evaluation RunStore::at(const Eigen::VectorXd& values, const std::function<Evalu
             return known->second;
         }
     }
+    return again(values, run);
+}
+
+Evaluation RunStore::again(const Eigen::VectorXd& values, const std::function<Evaluation()>& run) {
+    const std::vector<double> key(values.begin(), values.end());
     const Evaluation evaluation = run();
     if (!evaluation.usable() && stop_ && *stop_) {
         return evaluation;
     }
-    if (journal_) {
+    const std::lock_guard lock(mutex_);
+    const auto [known, is_new] = known_.emplace(key, evaluation);
+    if (journal_ && is_new) {
         journal_->add(stored(key, evaluation));
     }
-    const std::lock_guard lock(mutex_);
-    return known_.emplace(key, evaluation).first->second;
+    return known->second;
 }
 
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {

@@ -33,6 +33,9 @@ class RunStore {
     /// threads at a time. A run that the user has stopped is not kept.
     Evaluation at(const Eigen::VectorXd& values, const std::function<Evaluation()>& run);
 
+    /// What `run` gives now, kept as it would be by `at`: where what later runs give hangs on this one having been made, in this process.
+    Evaluation again(const Eigen::VectorXd& values, const std::function<Evaluation()>& run);
+
   private:
     std::unique_ptr<RunJournal> journal_;
     const std::atomic<bool>* stop_;

@@ -2,6 +2,7 @@
 
 #include "inverse/minimize.hpp"
 #include "inverse/pool.hpp"
+#include "inverse/sobol_points.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +10,6 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <random>
 #include <vector>
 
 namespace crampfit {
@@ -20,10 +20,8 @@ constexpr int most_failed_starts = 20;
 using Stage = std::function<void(const std::string&)>;
 
 std::vector<Eigen::VectorXd> start_points(int count, const Eigen::VectorXd& initial, unsigned seed) {
-    std::vector<Eigen::VectorXd> points{initial};
-    for (int i = 1; i < count; ++i) {
-        points.push_back(halton(i, initial.size(), seed));
-    }
+    std::vector<Eigen::VectorXd> points = sobol_points(count, initial.size(), seed);
+    points.front() = initial;
     return points;
 }
 
@@ -33,7 +31,7 @@ void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, uns
     for (int i = from; i < from + most_failed_starts && !objective.best() && !objective.exhausted(); i += together) {
         std::vector<Eigen::VectorXd> points;
         for (int k = 0; k < together; ++k) {
-            points.push_back(halton(i + k, initial.size(), seed));
+            points.push_back(sobol_point(i + k, initial.size(), seed));
         }
         objective.at(points);
     }
@@ -158,34 +156,6 @@ SearchResult search_from_starts(Objective& objective, const Method& method, int 
 }
 
 }  // namespace
-
-Eigen::VectorXd halton(int index, Eigen::Index dimensions, unsigned seed) {
-    // Halton (1960): the digits of the index in a prime base, mirrored at the point; another base for each dimension.
-    std::mt19937 generator(seed);
-    Eigen::VectorXd point(dimensions);
-    int base = 1;
-    for (Eigen::Index j = 0; j < dimensions; ++j) {
-        const auto is_prime = [](int n) {
-            for (int divisor = 2; divisor * divisor <= n; ++divisor) {
-                if (n % divisor == 0) {
-                    return false;
-                }
-            }
-            return true;
-        };
-        do {
-            ++base;
-        } while (!is_prime(base));
-        double value = static_cast<double>(generator()) / 4294967296.0;  // 2^32
-        double weight = 1;
-        for (int digits = index; digits > 0; digits /= base) {
-            weight /= base;
-            value += weight * (digits % base);
-        }
-        point[j] = value - std::floor(value);
-    }
-    return point;
-}
 
 SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,
                     const Stage& stage) {

@@ -16,10 +16,7 @@ struct SearchResult {
     std::string method;  // what did the work, and why it was chosen
 };
 
-/// Point `index` of a Halton sequence in the unit cube, shifted by an amount drawn from the seed [dimensions].
-Eigen::VectorXd halton(int index, Eigen::Index dimensions, unsigned seed);
-
-/// Searches the unit cube as a study asks: from `initial` and `starts - 1` further points that fill the box evenly.
+/// Searches the unit cube as a study asks: from `initial` and `starts - 1` further Sobol points of the box.
 /// Local methods descend from each of them, side by side; global ones have the box for themselves; `auto` runs each of
 /// them once, descends from the best, and from others only as long as the noise does not explain the misfit. `stage` is
 /// told what is going on.

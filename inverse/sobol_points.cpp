@@ -30,4 +30,8 @@ std::vector<Eigen::VectorXd> sobol_points(int count, Eigen::Index dimensions, un
     return points;
 }
 
+Eigen::VectorXd sobol_point(int number, Eigen::Index dimensions, unsigned seed) {
+    return sobol_points(number + 1, dimensions, seed).back();
+}
+
 }  // namespace crampfit

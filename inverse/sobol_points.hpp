@@ -11,4 +11,7 @@ namespace crampfit {
 /// cube's faces, and a power of two of them stays as even as it was. Up to 3667 dimensions.
 std::vector<Eigen::VectorXd> sobol_points(int count, Eigen::Index dimensions, unsigned seed);
 
+/// One of them, by its number from 0.
+Eigen::VectorXd sobol_point(int number, Eigen::Index dimensions, unsigned seed);
+
 }  // namespace crampfit

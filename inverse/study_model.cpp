@@ -36,17 +36,60 @@ double softened(double r, Loss loss) {
 }  // namespace
 
 StudyModel::StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop)
-    : study_(checked(study)), box_(study.parameters), runs_(study, std::move(forward), stop) {
+    : study_(checked(study)), resolution_(model_resolution), box_(study.parameters), comparisons_(comparisons_at(model_resolution)),
+      runs_(study, std::move(forward), stop) {
     std::size_t stations = 0;
-    for (const Experiment& experiment : study.experiments) {
-        comparisons_.emplace_back(experiment, model_resolution);
-        stations += comparisons_.back().stations().size();
+    for (const Comparison& comparison : comparisons_) {
+        stations += comparison.stations().size();
     }
     if (stations < study.parameters.size()) {
         throw InputError(
             study.file.empty() ? "study" : study.file.string(), "parameters", std::to_string(study.parameters.size()),
             "must be no more than the points to compare, of which the data gives " + std::to_string(stations));
     }
+}
+
+std::vector<Comparison> StudyModel::comparisons_at(double resolution) const {
+    std::vector<Comparison> comparisons;
+    for (const Experiment& experiment : study_.experiments) {
+        comparisons.emplace_back(experiment, resolution);
+    }
+    return comparisons;
+}
+
+void StudyModel::set_resolution(double resolution) {
+    resolution_ = resolution;
+    comparisons_ = comparisons_at(resolution);
+}
+
+
+double StudyModel::likely_resolution(const Evaluation& evaluation, double most) const {
+    constexpr double least = 1e-5;  // far below what any grid or gauge knows
+    constexpr int steps = 40;
+    const auto rows = static_cast<double>(evaluation.modelled.size());
+    const double share = 1.0 - static_cast<double>(box_.size()) / rows;  // of the rows that the fit leaves free
+    const auto deviance = [&](double resolution) {  // -2 ln L
+        double sum = 0;
+        Eigen::Index row = 0;
+        for (std::size_t i = 0; i < comparisons_.size(); ++i) {
+            const Comparison comparison(study_.experiments[i], resolution);
+            for (const FitResidual& station : comparison.stations()) {
+                const double r = softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss);
+                sum += study_.experiments[i].weight * (r * r + share * 2 * std::log(station.sigma));
+            }
+        }
+        return sum;
+    };
+    double likely = 0, lowest = deviance(0.0);
+    for (int i = 0; i <= steps; ++i) {
+        const double resolution = least * std::pow(most / least, static_cast<double>(i) / steps);
+        const double here = deviance(resolution);
+        if (here < lowest) {
+            lowest = here;
+            likely = resolution;
+        }
+    }
+    return likely;
 }
 
 Evaluation StudyModel::at(const Eigen::VectorXd& values, int threads) const {
@@ -65,7 +108,7 @@ Evaluation StudyModel::at(const Eigen::VectorXd& values, int threads) const {
         }
     });
     Evaluation result;
-    std::vector<double> residuals, modelled;
+    std::vector<double> modelled;
     bool good = true;
     for (std::size_t i = 0; i < outcomes.size(); ++i) {
         const Outcome& outcome = outcomes[i];
@@ -73,29 +116,36 @@ Evaluation StudyModel::at(const Eigen::VectorXd& values, int threads) const {
         const std::string who = outcomes.size() > 1 ? study_.experiments[i].name + ": " : "";
         result.status += (result.status.empty() ? "" : "; ") + who + outcome.status;
         good = good && outcome.modelled;
-        if (!good) {
-            continue;
-        }
-        for (Eigen::Index s = 0; s < outcome.modelled->size(); ++s) {
-            const double value = (*outcome.modelled)[s];
-            const FitResidual& station = comparisons_[i].stations()[static_cast<std::size_t>(s)];
-            modelled.push_back(value);
-            residuals.push_back(std::sqrt(study_.experiments[i].weight) *
-                                softened((value - station.measured) / station.sigma, study_.optimizer.loss));
+        if (good) {
+            modelled.insert(modelled.end(), outcome.modelled->begin(), outcome.modelled->end());
         }
     }
-    if (!good) {
-        return result;
+    if (good) {
+        result.modelled = Eigen::Map<Eigen::VectorXd>(modelled.data(), static_cast<Eigen::Index>(modelled.size()));
+        weigh(result, values);
+    }
+    return result;
+}
+
+void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) const {
+    if (evaluation.modelled.size() == 0) {
+        return;
+    }
+    std::vector<double> residuals;
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < comparisons_.size(); ++i) {
+        const double weight = std::sqrt(study_.experiments[i].weight);
+        for (const FitResidual& station : comparisons_[i].stations()) {
+            residuals.push_back(weight * softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss));
+        }
     }
     for (Eigen::Index j = 0; j < box_.size(); ++j) {
         if (const auto& prior = box_.parameters()[static_cast<std::size_t>(j)].prior) {
             residuals.push_back((values[j] - prior->mean) / prior->sd);
         }
     }
-    result.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));
-    result.modelled = Eigen::Map<Eigen::VectorXd>(modelled.data(), static_cast<Eigen::Index>(modelled.size()));
-    result.misfit = result.residuals.squaredNorm();
-    return result;
+    evaluation.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));
+    evaluation.misfit = evaluation.residuals.squaredNorm();
 }
 
 std::vector<int> StudyModel::curve_lengths() const {

@@ -12,9 +12,9 @@
 
 namespace crampfit {
 
-// Displacements at which a crack moves differ by this much from grid to grid: in explicit dynamics for vibration and for arrests
+// Displacements at which a crack moves differ by up to this much from grid to grid: in explicit dynamics for vibration and for arrests
 // between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
-// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more).
+// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more). How much of it a fit needs, its residuals tell.
 inline constexpr double solver_resolution = 0.02;
 
 /// A study made ready to be run at any point of its unit cube: one Comparison an experiment.
@@ -31,13 +31,28 @@ class StudyModel {
     /// The same with the parameters' values, SI.
     Evaluation at(const Eigen::VectorXd& values, int threads) const;
 
+    /// Weighs what has been modelled with these values anew, where it is usable: residuals and misfit.
+    void weigh(Evaluation& evaluation, const Eigen::VectorXd& values) const;
+
+    /// How well the model is taken to know what it says (Comparison); from `set_resolution` on runs are weighed by it.
+    double resolution() const { return resolution_; }
+    void set_resolution(double resolution);
+
+    /// The resolution up to `most` that makes a usable evaluation's residuals most likely: what they have beyond the data's noise is the
+    /// model's. Maximum likelihood of a component of variance, `parameters` degrees of freedom being the fit's (Harville 1977, Maximum
+    /// likelihood approaches to variance component estimation, J. Am. Stat. Assoc. 72).
+    double likely_resolution(const Evaluation& evaluation, double most) const;
+
     const UnitBox& box() const { return box_; }
     std::vector<int> curve_lengths() const;                       // stations of each measured curve, in order
     std::vector<FitResidual> residuals(const Evaluation&) const;  // of a usable evaluation, without priors
     std::string remarks() const;                                  // on the data, for a person
 
   private:
+    std::vector<Comparison> comparisons_at(double resolution) const;
+
     const Study& study_;
+    double resolution_;
     UnitBox box_;
     std::vector<Comparison> comparisons_;  // one an experiment
     SceneRuns runs_;

@@ -162,7 +162,8 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.covariance += own;
     result.widening = widening;
     result.model_variance = own.diagonal();
-    result.message += undetermined.message();
+    result.untold = undetermined.message();
+    result.message += result.untold;
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
     if (share > 0.1) {
         result.message +=

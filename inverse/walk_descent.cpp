@@ -1,6 +1,8 @@
 #include "inverse/walk_descent.hpp"
 
 #include "inverse/minimize.hpp"
+#include "inverse/sobol_points.hpp"
+#include "inverse/window.hpp"
 
 #include <Eigen/Cholesky>
 
@@ -19,23 +21,12 @@ constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
 
 constexpr int points_a_parameter = 12;  // of a spread
-constexpr int model_descents = 2;
+constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
+constexpr int model_descents = 4;    // from the lowest of them
 constexpr int runs_across_kinks = 120;
 constexpr int most_polishing_steps = 15;
 constexpr double polishing_difference = 1e-5;
 constexpr int most_cheap_runs = 100000;
-
-// What lies within a radius of a centre along each axis, as a unit cube.
-struct Window {
-    Eigen::VectorXd low, high;
-
-    Window(const Eigen::VectorXd& centre, double radius)
-        : low((centre.array() - radius).cwiseMax(0.0)), high((centre.array() + radius).cwiseMin(1.0)) {}
-    Eigen::VectorXd inside(const Eigen::VectorXd& y) const { return low + y.cwiseProduct(high - low); }
-    Eigen::VectorXd share(const Eigen::VectorXd& x) const {
-        return (x - low).cwiseQuotient((high - low).cwiseMax(1e-300)).cwiseMax(0.0).cwiseMin(1.0);
-    }
-};
 
 // Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
 void polish(Objective& cheap, Eigen::VectorXd y) {
@@ -80,13 +71,10 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
 
 // The lowest point of the model in the window.
 Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
-    const int model_starts = 2 * static_cast<int>(centre.size()) + 2;
     Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
                     most_cheap_runs, objective.threads(), objective.stop());
-    std::vector<Eigen::VectorXd> starts{window.share(centre)};
-    for (int i = 1; i < model_starts; ++i) {
-        starts.push_back(halton(i, centre.size(), seed));
-    }
+    std::vector<Eigen::VectorXd> starts = sobol_points(model_starts * static_cast<int>(centre.size()), centre.size(), seed);
+    starts.front() = window.share(centre);
     cheap.at(starts);
     std::vector<Run> order = cheap.runs();
     std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
@@ -108,8 +96,8 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
 
 void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed) {
     std::vector<Eigen::VectorXd> points{x};
-    for (int i = 1; i <= points_a_parameter * static_cast<int>(x.size()); ++i) {
-        const Eigen::VectorXd away = 1.5 * step * (2.0 * halton(i, x.size(), seed).array() - 1.0);
+    for (const Eigen::VectorXd& even : sobol_points(points_a_parameter * static_cast<int>(x.size()), x.size(), seed)) {
+        const Eigen::VectorXd away = 1.5 * step * (2.0 * even.array() - 1.0);
         points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
     }
     objective.at(points);
@@ -149,6 +137,11 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
 
 }  // namespace
 
+bool descend_again(Objective& objective, const Near& near, const Near& rough, unsigned seed) {
+    const Eigen::VectorXd start = objective.best()->x;
+    return descend_from(objective, near, rough, start, seed);
+}
+
 SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
                               unsigned seed, const std::function<void(const std::string&)>& stage) {
     stage("descent");
@@ -158,7 +151,7 @@ SearchResult descend_by_walks(Objective& objective, const Near& near, const Near
            !(objective.best() && is_explained(*objective.best()->evaluation, initial.size()))) {
         const double least = objective.best() ? objective.best()->evaluation->misfit : INFINITY;
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : halton(descents, initial.size(), seed), seed);
+        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : sobol_point(descents, initial.size(), seed), seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {

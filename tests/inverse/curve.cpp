@@ -10,12 +10,15 @@ namespace {
 
 const double nan_ = std::nan("");
 
-TEST(UnitCurve, SortsRowsSkipsGapsAndAveragesEqualPlaces) {
+TEST(UnitCurve, SortsRowsSkipsGapsAndStepsAtEqualPlaces) {
     const std::vector<double> x{2, 0, 1, 1, 3, nan_, 4};
     const std::vector<double> y{20, 0, 8, 12, nan_, 7, 40};
     const Curve curve(x, y);
-    EXPECT_EQ(curve.x(), (std::vector<double>{0, 1, 2, 4}));
-    EXPECT_EQ(curve.y(), (std::vector<double>{0, 10, 20, 40}));
+    EXPECT_EQ(curve.x(), (std::vector<double>{0, 1, std::nextafter(1.0, 2.0), 2, 4}));
+    EXPECT_EQ(curve.y(), (std::vector<double>{0, 8, 12, 20, 40}));
+    EXPECT_NEAR(curve.mean(0, 2), 0.5 * (0.5 * 8 + 0.5 * (12 + 20)), 1e-14);
+    const Curve many(std::vector<double>{0, 1, 1, 1, 2}, std::vector<double>{0, 1, 2, 6, 0});
+    EXPECT_EQ(many.y(), (std::vector<double>{0, 1.5, 4, 0}));
 }
 
 TEST(UnitCurve, InterpolatesAndContinuesItsEnds) {
@@ -49,6 +52,22 @@ TEST(UnitCurve, SmoothingKeepsAStraightLineUpToItsEnds) {
     for (std::size_t i = 0; i < x.size(); ++i) {
         EXPECT_NEAR(smooth.y()[i], y[i], 1e-13);
     }
+}
+
+// A test that ends with a jump has its last two rows at one displacement.
+TEST(UnitCurve, SmoothingLeavesAStepAtTheEnd) {
+    std::vector<double> x, y;
+    for (int i = 0; i <= 1000; ++i) {
+        x.push_back(0.9366060300e-6 * i);
+        y.push_back(1.1e-3 + 0.6e-6 * i);
+    }
+    x.push_back(x.back());
+    y.push_back(3.9e-3);
+    const Curve smooth = Curve(x, y).smoothed(2e-5);
+    for (std::size_t i = 1; i < smooth.y().size(); ++i) {
+        EXPECT_GE(smooth.y()[i], smooth.y()[i - 1]);
+    }
+    EXPECT_DOUBLE_EQ(smooth.y().back(), 3.9e-3);
 }
 
 TEST(UnitCurve, SmoothingTakesOutAVibrationOfItsOwnPeriod) {

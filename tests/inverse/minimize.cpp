@@ -3,6 +3,7 @@
 #include "inverse/local_model.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/search.hpp"
+#include "inverse/sobol_points.hpp"
 
 #include <gtest/gtest.h>
 
@@ -276,13 +277,13 @@ TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {
 TEST(UnitSearch, StartsFillTheBoxEvenly) {
     for (const unsigned seed : {1u, 2u}) {
         std::set<int> cells;
-        for (int i = 1; i <= 36; ++i) {
-            const VectorXd x = halton(i, 2, seed);
-            cells.insert(static_cast<int>(x[0] * 4) + 4 * static_cast<int>(x[1] * 3));
+        for (int i = 0; i < 16; ++i) {
+            const VectorXd x = sobol_point(i, 2, seed);
+            cells.insert(static_cast<int>(x[0] * 4) + 4 * static_cast<int>(x[1] * 4));
         }
-        EXPECT_EQ(cells.size(), 12u);  // of 4 x 3 cells, none is left empty
+        EXPECT_EQ(cells.size(), 16u);  // one in each: a (0, 4, 2)-net in base 2 (Sobol 1967)
     }
-    EXPECT_NE(halton(1, 2, 1u), halton(1, 2, 2u));
+    EXPECT_NE(sobol_point(1, 2, 1u), sobol_point(1, 2, 2u));
 }
 
 }  // namespace
