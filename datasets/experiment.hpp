@@ -129,8 +129,8 @@ struct SensitivityChoice {
     int samples = 0;  // sobol: rows of each of the two sample matrices; morris: trajectories; 0: as many as the method needs
 };
 
-/// What a scene must be asked for so that its record can be compared with measured fields: `samples_a_subset` places in each subset,
-/// point by point, at each picture's instant.
+/// What a scene must be asked for so that its record can be compared with measured fields: the displacement of each subset, of
+/// `samples_a_subset` places in it, as correlation averages them, at each picture's instant.
 Probes probes_for(const MeasuredFields& fields);
 
 /// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives at its

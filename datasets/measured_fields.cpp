@@ -108,7 +108,7 @@ std::vector<double> subset_weights(int order) {
 }
 
 Probes probes_for(const MeasuredFields& fields) {
-    Probes probes{{}, fields.instants, fields.by_displacement};
+    Probes probes{{}, fields.instants, fields.by_displacement, subset_weights(fields.order)};
     const Eigen::Rotation2Dd turn(fields.rotation);
     for (const Vec2& place : fields.places) {
         for (int k = 0; k < samples_a_subset; ++k) {

@@ -69,7 +69,7 @@ struct Frame {
 
 /// What the probes of a scene read at one instant.
 struct ProbeReading {
-    std::vector<Vec2> moved;                // displacement at each place [m]; not a number where there is no material
+    std::vector<Vec2> moved;                // displacement of each group of places [m]; not a number where there is no material
     std::vector<std::vector<Vec2>> cracks;  // each crack's vertices then, in the undeformed specimen [m]
 };
 

@@ -241,6 +241,7 @@ struct Probes {
     std::vector<Vec2> places;      // undeformed [m]
     std::vector<double> instants;  // rising: times [s], or displacements of the measured edge or body [m]
     bool by_displacement = false;
+    std::vector<double> weights = {1.0};  // a reading is the sum over so many places, one group after the other, weighed by these
 };
 
 struct Output {

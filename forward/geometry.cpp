@@ -99,4 +99,11 @@ double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x) {
     return squared > 0 ? std::clamp((x - a).dot(along) / squared, 0.0, 1.0) : 0.0;
 }
 
+double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k + 1 < line.size(); ++k)
+        least = std::min(least, (line[k] + nearest_on_segment(line[k], line[k + 1], x) * (line[k + 1] - line[k]) - x).norm());
+    return least;
+}
+
 } // namespace crampfit

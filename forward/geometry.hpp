@@ -44,4 +44,7 @@ std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, c
 /// Nearest place on segment a-b to x, as a fraction of the way from a to b.
 double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x);
 
+/// From a place to the nearest of a line of at least two vertices [m].
+double distance_to(const std::vector<Vec2>& line, const Vec2& x);
+
 } // namespace crampfit

@@ -31,7 +31,7 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool ro
     Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) {
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
     });
-    read_probes(scene, plan_, materials_, *walk_, record);
+    read_probes(scene, *walk_, record);
     record.steps = walk_->equilibria() - known;
     record.points = walk_->points();
     record.scene_text = scene.text;

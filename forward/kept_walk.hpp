@@ -31,8 +31,7 @@ class KeptWalk {
     bool linear() const { return plan_.linear; }
 
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
-    /// with the equilibria that are known, where it can. Probes are solved for, and read as for the first scene's numbers. One run at a
-    /// time: others wait.
+    /// with the equilibria that are known, where it can. One run at a time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options, bool rough = false);
 
   private:

@@ -183,7 +183,7 @@ class March {
         const Probes& probes = scene_.output.probes;
         if (record_.probes.size() == probes.instants.size()) return;
         const double here = probes.by_displacement ? equilibrium_.measured_displacement(equilibrium_.time()) : equilibrium_.time();
-        ProbeReading reading = read_probes(probes.places, body_, equilibrium_.cracks(), equilibrium_.displacements());
+        ProbeReading reading = read_probes(probes, body_, equilibrium_.cracks(), equilibrium_.displacements());
         while (record_.probes.size() < probes.instants.size() && here >= probes.instants[record_.probes.size()] * (1.0 - rounding)) {
             ProbeReading& due = record_.probes.emplace_back(reading);
             if (last_reading_.moved.empty() || here == last_place_) continue;

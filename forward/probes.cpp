@@ -1,29 +1,35 @@
 #include "forward/probes.hpp"
 
-#include "forward/geometry.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 namespace crampfit {
 
-ProbeReading read_probes(const std::vector<Vec2>& places, const Discretisation& body, const CrackFields& cracks,
-                         const std::vector<Vec2>& displacement) {
+std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
+                                           const std::vector<const std::vector<Vec2>*>& displacements) {
     const Layout& layout = body.layout;
-    ProbeReading reading;
-    for (const Vec2& place : places) {
-        Vec2 moved = Vec2::Zero();
+    std::vector<std::vector<Vec2>> readings(displacements.size());
+    const std::size_t group = probes.weights.size();
+    for (std::size_t i = 0; i < probes.places.size(); ++i) {
+        const Vec2& place = probes.places[i];
+        if (i % group == 0)
+            for (auto& reading : readings) reading.push_back(Vec2::Zero());
         if (body.point_at(place) < 0) {
-            moved.setConstant(std::numeric_limits<double>::quiet_NaN());
-        } else {
-            const auto weights = body.values_at(layout.cell_at(place), place);
-            const auto fields = cracks.fields_at(place);
-            for (int k = 0; k < layout.nodes_per_cell(); ++k) moved += weights[k] * displacement[fields[k]];
+            for (auto& reading : readings) reading.back().setConstant(std::numeric_limits<double>::quiet_NaN());
+            continue;
         }
-        reading.moved.push_back(moved);
+        const auto weights = body.values_at(layout.cell_at(place), place);
+        const auto fields = cracks.fields_at(place);
+        for (std::size_t d = 0; d < displacements.size(); ++d)
+            for (int k = 0; k < layout.nodes_per_cell(); ++k)
+                readings[d].back() += probes.weights[i % group] * weights[k] * (*displacements[d])[fields[k]];
     }
+    return readings;
+}
+
+ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks, const std::vector<Vec2>& displacement) {
+    ProbeReading reading{read_probes(probes, body, cracks, {&displacement}).front(), {}};
     for (const CrackLine& line : cracks.lines) reading.cracks.push_back(line.points);
     return reading;
 }
@@ -36,9 +42,6 @@ SeriesPlace place_in(const std::vector<Instant>& series, double at, bool by_disp
     const Instant& before = *std::prev(after);
     return {static_cast<std::size_t>(after - series.begin()) - 1, (at - value(before)) / (value(*after) - value(before))};
 }
-
-Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk)
-    : walk_(walk), body_(scene, materials), equilibrium_(scene, plan, materials, body_) {}
 
 namespace {
 
@@ -56,18 +59,8 @@ double time_at(const Record& record, const SeriesPlace& place) {
 
 } // namespace
 
-// Moves the tips that move on from the station by this share of the way to the next.
-void Revisit::grow(double share) {
-    for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
-        const Vec2& start = walk_.station(station_).tips[crack][at_end];
-        const Vec2 to = start + share * (walk_.station(station_ + 1).tips[crack][at_end] - start);
-        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
-        if (tip.inside && (to - tip.position).norm() > 1e-6 * body_.layout.cell.minCoeff()) equilibrium_.grow(crack, at_end, to);
-    }
-}
-
 // How much of the way from the station to the next the cracks have gone.
-double Revisit::share_gone(const Record& record, const SeriesPlace& place) {
+double WayFinder::share_gone(const Record& record, const SeriesPlace& place) {
     if (walk_.station(station_).left || !walk_.reach(station_ + 1, time_at(record, place))) return 0.0;
     double least = 1.0;
     for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
@@ -79,66 +72,60 @@ double Revisit::share_gone(const Record& record, const SeriesPlace& place) {
     return least > 1.0 - 1e-9 ? 1.0 : least;
 }
 
-bool Revisit::to(const Record& record, const SeriesPlace& place) {
-    while (share_gone(record, place) == 1.0) {
-        grow(1.0);
-        ++station_;
+void WayFinder::to(const Record& record, const SeriesPlace& place) {
+    while ((share_ = share_gone(record, place)) == 1.0) ++station_;
+}
+
+Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk)
+    : walk_(walk), finder_(walk), body_(scene, materials), equilibrium_(scene, plan, materials, body_) {}
+
+// Moves the tips that move on from the station by this share of the way to the next.
+void Revisit::grow(double share) {
+    for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
+        const Vec2& start = walk_.station(station_).tips[crack][at_end];
+        const Vec2 to = start + share * (walk_.station(station_ + 1).tips[crack][at_end] - start);
+        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
+        if (tip.inside && (to - tip.position).norm() > 1e-6 * body_.layout.cell.minCoeff()) equilibrium_.grow(crack, at_end, to);
     }
-    if (const double share = share_gone(record, place); share > 0.0) grow(share);
+}
+
+bool Revisit::to(const Record& record, const SeriesPlace& place) {
+    finder_.to(record, place);
+    for (; station_ < finder_.station(); ++station_) grow(1.0);
+    if (finder_.share() > 0.0) grow(finder_.share());
     return equilibrium_.solve(time_at(record, place)) == Equilibrium::Outcome::solved;
 }
 
-namespace {
-
-Scene with_wide_cells(Scene scene) {
-    scene.model.cell *= 2.0;
-    return scene;
-}
-
-// The same walk on cells twice as wide.
-struct WideRevisit {
-    WideRevisit(const Scene& fine, const Plan& plan, Quasistatic& walk)
-        : scene(with_wide_cells(fine)), materials(scene), revisit(scene, plan, materials, walk) {}
-
-    Scene scene;
-    MaterialMap materials;
-    Revisit revisit;
-};
-
-double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k + 1 < line.size(); ++k)
-        least = std::min(least, (line[k] + nearest_on_segment(line[k], line[k + 1], x) * (line[k + 1] - line[k]) - x).norm());
-    return least;
-}
-
-// Takes off a third of the difference to the wider grid, as for all else of an equilibrium (`extrapolate`). Not beside a crack, where
-// the wide grid knows next to nothing.
-void extrapolate(ProbeReading& fine, const ProbeReading& wide, const std::vector<Vec2>& places, double wide_cell) {
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        const bool beside = std::any_of(fine.cracks.begin(), fine.cracks.end(), [&](const auto& line) { return distance_to(line, places[i]) < 2.0 * wide_cell; });
-        if (!beside && wide.moved[i].allFinite()) fine.moved[i] += (fine.moved[i] - wide.moved[i]) / 3.0;
-    }
-}
-
-ProbeReading read_probes(const std::vector<Vec2>& places, const Revisit& revisit) {
-    return read_probes(places, revisit.body(), revisit.equilibrium().cracks(), revisit.equilibrium().displacements());
-}
-
-} // namespace
-
-void read_probes(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
+void read_probes(const Scene& scene, Quasistatic& walk, Record& record) {
     const Probes& probes = scene.output.probes;
     if (probes.places.empty()) return;
-    Revisit revisit(scene, plan, materials, walk);
-    std::optional<WideRevisit> wide;
-    if (plan.extrapolates) wide.emplace(scene, plan, walk);
+    WayFinder finder(walk);
+    std::vector<std::vector<Vec2>> cracks;  // up to the station
+    for (const Crack& crack : scene.cracks) cracks.push_back(crack.points);
+    const auto add = [](std::vector<std::vector<Vec2>>& lines, const std::vector<std::array<Vec2, 2>>& tips) {
+        for (std::size_t k = 0; k < lines.size(); ++k) {
+            if (tips[k][1] != lines[k].back()) lines[k].push_back(tips[k][1]);
+            if (tips[k][0] != lines[k].front()) lines[k].insert(lines[k].begin(), tips[k][0]);
+        }
+    };
+    std::size_t reached = 0;
     for (const double at : probes.instants) {
         const SeriesPlace place = place_in(record.series, at, probes.by_displacement);
-        if (!revisit.to(record, place)) return;
-        ProbeReading& reading = record.probes.emplace_back(read_probes(probes.places, revisit));
-        if (wide && wide->revisit.to(record, place))
-            extrapolate(reading, read_probes(probes.places, wide->revisit), probes.places, wide->revisit.body().layout.cell.maxCoeff());
+        const double time = time_at(record, place);
+        finder.to(record, place);
+        for (; reached < finder.station(); ++reached) add(cracks, walk.station(reached + 1).tips);
+        ProbeReading reading{walk.probes_at(reached, time), cracks};
+        if (const double share = finder.share(); share > 0.0) {
+            const std::vector<Vec2> next = walk.probes_at(reached + 1, time);
+            if (next.empty()) return;
+            for (std::size_t i = 0; i < reading.moved.size(); ++i) reading.moved[i] += share * (next[i] - reading.moved[i]);
+            std::vector<std::array<Vec2, 2>> tips = walk.station(reached).tips;
+            for (std::size_t k = 0; k < tips.size(); ++k)
+                for (int end = 0; end < 2; ++end) tips[k][end] += share * (walk.station(reached + 1).tips[k][end] - tips[k][end]);
+            add(reading.cracks, tips);
+        }
+        if (reading.moved.empty()) return;
+        record.probes.push_back(std::move(reading));
     }
 }
 

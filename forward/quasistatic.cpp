@@ -1,6 +1,8 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/geometry.hpp"
+#include "forward/probes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -112,15 +114,41 @@ void Quasistatic::keep(std::size_t number, int time, LoadState state) {
     places_[number].states[time] = places_[number].station.states[time] = std::move(state);
 }
 
-void Quasistatic::keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes) {
-    for (std::size_t n = 0; coarse_ && n < slopes.size(); ++n)
-        extrapolate(slopes[n], coarse_->walk.places_[number].slopes.at(time)[n]);
+// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know next to
+// nothing.
+void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& coarse) const {
+    constexpr double beside = 2.0;  // [wide cells]
+    const double reach = beside * coarse_->walk.body_.layout.cell.maxCoeff();
+    const Probes& asked = scene_.output.probes;
+    const std::size_t group = asked.weights.size();
+    for (std::size_t i = 0; i < probes.size() && !coarse.empty(); ++i) {
+        bool far = coarse[i].allFinite();
+        for (std::size_t k = i * group; k < (i + 1) * group && far; ++k)
+            for (const CrackLine& line : equilibrium_.cracks().lines) far = far && distance_to(line.points, asked.places[k]) > reach;
+        if (far) probes[i] += (probes[i] - coarse[i]) / 3.0;
+    }
+}
+
+// Keeps what the scene's probes read where the equilibrium stands.
+void Quasistatic::keep_probes(std::size_t number, int time) {
+    if (scene_.output.probes.places.empty()) return;
+    std::vector<Vec2>& kept = places_[number].probes[time];
+    kept = read_probes(scene_.output.probes, body_, equilibrium_.cracks(), {&equilibrium_.displacements()}).front();
+    if (coarse_) take_off_grid_error(kept, coarse_->walk.places_[number].probes[time]);
+}
+
+void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
+    for (std::size_t n = 0; coarse_ && n < slopes.states.size(); ++n) {
+        const Slopes& coarse = coarse_->walk.places_[number].slopes.at(time);
+        extrapolate(slopes.states[n], coarse.states[n]);
+        if (!slopes.probes.empty() && !coarse.probes.empty()) take_off_grid_error(slopes.probes[n], coarse.probes[n]);
+    }
     places_[number].slopes[time] = std::move(slopes);
     if (!shift_.empty()) show_shifted(number, time);
 }
 
 // Derivatives of the state where the equilibrium stands. What is prescribed has none.
-std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
+std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
     const Boundary& boundary = equilibrium_.boundary();
     const Gauges gauges(scene_);
     std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
@@ -141,15 +169,23 @@ std::optional<std::vector<LoadState>> Quasistatic::slopes_here() {
         if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
     }
-    // A tip's own G counts where that says when it moves.
     std::vector<std::vector<Vec2>> moved;
+    Slopes all;
+    if (!scene_.output.probes.places.empty()) {
+        moved = equilibrium_.displacement_slopes(slope);
+        std::vector<const std::vector<Vec2>*> each;
+        for (const std::vector<Vec2>& of_number : moved) each.push_back(&of_number);
+        all.probes = read_probes(scene_.output.probes, body_, equilibrium_.cracks(), each);
+    }
+    // A tip's own G counts where that says when it moves.
     for (const GrowingTip& tip : growing_) {
         if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
         if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
         for (std::size_t n = 0; n < numbers_.size(); ++n)
             found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
     }
-    return found;
+    all.states = std::move(found);
+    return all;
 }
 
 // Puts what the shift makes of a state in its place. To first order; as powers of the numbers, which is exact where all the wood
@@ -158,7 +194,7 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
     constexpr double most = 2.0;  // change of the logarithm
     Place& place = places_[number];
     LoadState state = place.states.at(time);
-    const std::vector<LoadState>& slopes = place.slopes.at(time);
+    const std::vector<LoadState>& slopes = place.slopes.at(time).states;
     const auto move = [&](double& value, auto slope_of) {
         double change = 0.0;
         for (std::size_t n = 0; n < shift_.size(); ++n) change += shift_[n] * slope_of(slopes[n]);
@@ -199,7 +235,8 @@ bool Quasistatic::know_linear(std::size_t number) {
         const bool good = solve(2);
         if (!good && !places_[number].station.left) return false;
         const LoadState full = good ? load_state() : nothing(time_of(2));
-        std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));
+        if (good) keep_probes(number, 2);
+        Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};
         if (good && !numbers_.empty()) {
             auto here = slopes_here();
             if (!here) return false;
@@ -207,8 +244,9 @@ bool Quasistatic::know_linear(std::size_t number) {
         }
         for (const int time : {0, 1, 2}) {
             keep(number, time, scaled(full, 0.5 * time));
-            std::vector<LoadState> at_time;
-            for (const LoadState& slope : slopes) at_time.push_back(scaled(slope, 0.5 * time));
+            Slopes at_time;
+            for (const LoadState& slope : slopes.states) at_time.states.push_back(scaled(slope, 0.5 * time));
+            if (time == 2) at_time.probes = std::move(slopes.probes);
             keep_slopes(number, time, std::move(at_time));
         }
         return true;
@@ -226,6 +264,7 @@ bool Quasistatic::know_linear(std::size_t number) {
         for (std::size_t d = 0; d < moved.size(); ++d) between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
         equilibrium_.set_displacements(u, time_of(time), between);
         keep(number, time, load_state());
+        if (time != 1) keep_probes(number, time);
         if (numbers_.empty()) continue;
         auto slopes = slopes_here();
         if (!slopes) return false;
@@ -372,7 +411,7 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
     Place& place = places_[number];
     if (place.slopes.count(time)) return true;
     if (coarse_ && !coarse_->walk.know_slopes(number, time)) return false;
-    std::vector<LoadState> slopes(numbers_.size(), nothing(0.0));  // of what carries nothing
+    Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};  // of what carries nothing
     const auto known = place.known.find(time);
     if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
         enter(place);
@@ -398,6 +437,7 @@ bool Quasistatic::find(std::size_t number, int time) {
     if (solve_for(number, time)) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
+        keep_probes(number, time);
         return true;
     }
     if (!place.station.left) return false;
@@ -424,6 +464,31 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
         if (!know(number, low) || !know(number, low + 1)) fail();
     }
     return station.states.empty() ? nothing(time) : station.at(time);
+}
+
+std::vector<Vec2> Quasistatic::probes_at(std::size_t station_number, double time) {
+    at(station_number, time);  // finds what lies about it
+    const int number = way_[station_number];
+    Place& place = places_[number];
+    if (place.probes.empty()) return {};
+    // Without an equilibrium before it nothing has moved when the load begins; a rough walk may know none after it.
+    const double t = std::min(time, plan_.still_from);
+    auto after = place.probes.lower_bound(plan_.linear ? last_time_ : std::min(static_cast<int>(t / time_step_) + 1, last_time_));
+    if (after == place.probes.end()) --after;
+    const bool first = after == place.probes.begin();
+    const double from = first ? 0.0 : time_of(std::prev(after)->first);
+    const double share = (t - from) / (time_of(after->first) - from);
+    std::vector<Vec2> found(after->second.size(), Vec2::Zero());
+    const auto add = [&](const std::pair<const int, std::vector<Vec2>>& known, double weight) {
+        for (std::size_t i = 0; i < found.size(); ++i) found[i] += weight * known.second[i];
+        if (shift_.empty() || weight == 0.0 || !know_slopes(number, known.first)) return;
+        const auto& slopes = place.slopes.at(known.first).probes;
+        for (std::size_t n = 0; n < slopes.size(); ++n)
+            for (std::size_t i = 0; i < found.size(); ++i) found[i] += weight * shift_[n] * slopes[n][i];
+    };
+    add(*after, share);
+    if (!first) add(*std::prev(after), 1.0 - share);
+    return found;
 }
 
 } // namespace crampfit

@@ -60,6 +60,9 @@ class Quasistatic {
     /// What a station is like at a time.
     LoadState at(std::size_t station, double time);
 
+    /// What the scene's probes read there then [readings] [m]; empty where there is no equilibrium.
+    std::vector<Vec2> probes_at(std::size_t station, double time);
+
     const std::string& failure() const { return failure_; }  // why no equilibrium was found; empty: all were
     int equilibria() const { return equilibria_; }            // solved for so far, of the finer grid
     long points() const { return body_.points.count(); }
@@ -71,6 +74,10 @@ class Quasistatic {
         double potential;                               // [J]
         double power;                                   // [W]
         Equilibrium::Contacts contacts = {};
+    };
+    struct Slopes {                                     // of an equilibrium [numbers]
+        std::vector<LoadState> states;
+        std::vector<std::vector<Vec2>> probes;          // [readings] of the scene's [m]; empty: none
     };
     struct GrowingTip {
         int crack;
@@ -90,7 +97,8 @@ class Quasistatic {
         std::map<int, Known> known;                     // by number of the time
         std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
-        std::map<int, std::vector<LoadState>> slopes;   // [numbers] their derivatives
+        std::map<int, Slopes> slopes;                   // their derivatives
+        std::map<int, std::vector<Vec2>> probes;        // what they read, whatever the shift; in a linear scene of times 0 and last
         std::set<int> guessed;                          // times at which the station's state is no more than roughly known
     };
 
@@ -120,9 +128,11 @@ class Quasistatic {
     bool solve_from(double potential, double power, double from, double time);
     bool know_ahead(std::size_t number, int time);
     void keep(std::size_t number, int time, LoadState state);
-    void keep_slopes(std::size_t number, int time, std::vector<LoadState> slopes);
+    void keep_probes(std::size_t number, int time);
+    void keep_slopes(std::size_t number, int time, Slopes slopes);
+    void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& coarse) const;
     bool know_slopes(std::size_t number, int time);
-    std::optional<std::vector<LoadState>> slopes_here();
+    std::optional<Slopes> slopes_here();
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     LoadState load_state() const;

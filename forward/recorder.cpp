@@ -180,7 +180,7 @@ void Recorder::read_due_probes() {
 }
 
 void Recorder::read_probes_now() {
-    record_.probes.push_back(read_probes(scene_.output.probes.places, body_, solver_.cracks(), solver_.displacements()));
+    record_.probes.push_back(read_probes(scene_.output.probes, body_, solver_.cracks(), solver_.displacements()));
 }
 
 void Recorder::save_frame() {

@@ -94,7 +94,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.steps = walk.equilibria();
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
-    read_probes(scene, plan, materials, walk, record);
+    read_probes(scene, walk, record);
     return record;
 }
 

@@ -47,7 +47,10 @@ Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::
     return {x, below, above};
 }
 
-Window wider(const Window& window, const Eigen::VectorXd& x) { return {x, room * (x - window.low), room * (window.high - x)}; }
+// Alike to either side: the edge of a jump nearby says nothing of the valley along it.
+Window wider(const Window& window, const Eigen::VectorXd& x) {
+    return {x, Eigen::VectorXd(room * (x - window.low).cwiseMax(window.high - x))};
+}
 
 // Puts the profile's intervals in the place of those of a parabola. False where one of them does not end in the window.
 bool take_profile(CloseLook& look) {

@@ -1,6 +1,7 @@
 #include "inverse/field_comparison.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/geometry.hpp"
 
 #include <Eigen/Dense>
 #include <fmt/format.h>
@@ -12,16 +13,6 @@
 
 namespace crampfit {
 namespace {
-
-double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
-    double least = INFINITY;
-    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
-        const Vec2 along = line[k + 1] - line[k];
-        const double t = std::clamp((x - line[k]).dot(along) / along.squaredNorm(), 0.0, 1.0);
-        least = std::min(least, (x - line[k] - t * along).norm());
-    }
-    return least;
-}
 
 // A small motion of the whole picture: a translation, and a turn about the origin.
 Eigen::MatrixXd motion_at(const Vec2& place) {
@@ -35,7 +26,6 @@ Eigen::MatrixXd motion_at(const Vec2& place) {
 FieldComparison::FieldComparison(const Experiment& experiment) {
     const MeasuredFields& fields = *experiment.fields;
     places_ = fields.places;
-    weights_ = subset_weights(fields.order);
     reach_ = fields.subset * std::numbers::sqrt2 / 2;
     camera_moves_ = fields.camera_moves;
     std::size_t followed = 0;
@@ -71,14 +61,6 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
                           camera_moves_ ? "; each picture may have moved and turned as a whole" : "");
 }
 
-Vec2 FieldComparison::in_subset(std::size_t place, const ProbeReading& reading) const {
-    Vec2 mean = Vec2::Zero();
-    for (std::size_t k = 0; k < weights_.size(); ++k) {
-        mean += weights_[k] * reading.moved[weights_.size() * place + k];
-    }
-    return mean;
-}
-
 std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, const ProbeReading& reading) const {
     std::vector<Vec2> values;
     std::vector<double> share;  // of a point that counts
@@ -87,7 +69,7 @@ std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, co
         for (const std::vector<Vec2>& crack : reading.cracks) {
             nearest = std::min(nearest, distance_to(crack, places_[point.place]));
         }
-        const Vec2 value = in_subset(point.place, reading);
+        const Vec2& value = reading.moved[point.place];
         share.push_back(value.allFinite() ? std::clamp(nearest / reach_ - 1, 0.0, 1.0) : 0.0);
         values.push_back(share.back() > 0 ? value : point.measured);
     }

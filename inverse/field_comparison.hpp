@@ -10,7 +10,7 @@
 namespace crampfit {
 
 /// Measured displacement fields as stations at which a Record is compared with them, x and y of each point in each picture that was
-/// followed. The record's displacements are averaged over each subset as correlation averages them.
+/// followed.
 ///
 /// Where the camera may have moved, the small translation and rotation that brings the record's field nearest to the picture's is added to
 /// it, for each picture anew: what is left is free of them, at the cost of three numbers a picture (variable projection; Golub and Pereyra
@@ -40,11 +40,9 @@ class FieldComparison {
     };
     std::vector<Vec2> modelled(const std::vector<Point>& points, const ProbeReading& reading) const;
     void move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const;
-    Vec2 in_subset(std::size_t place, const ProbeReading& reading) const;
 
     std::vector<Vec2> places_;                 // [m]
     std::vector<std::vector<Point>> pictures_;
-    std::vector<double> weights_;              // of the samples in a subset
     double reach_ = 0;                         // from the middle of a subset to its corner [m]
     bool camera_moves_ = true;
     std::vector<FitResidual> stations_;

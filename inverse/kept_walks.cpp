@@ -67,12 +67,12 @@ class KeptWalks::Store {
     }
 
     bool only_toughness() const {
-        return others_.empty() && !has_probes() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
+        return others_.empty() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
     }
 
     bool has_slopes() const {
         const bool of_wood = std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
-        return of_wood && !has_probes() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
+        return of_wood && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
     }
 
     bool depend_on_order() const {
@@ -97,11 +97,6 @@ class KeptWalks::Store {
     }
 
   private:
-    // Displacements at probes are solved for at each run, and known at the walk's own moduli alone.
-    bool has_probes() const {
-        return std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return !scene->output.probes.places.empty(); });
-    }
-
     Record run(const Scene& base, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         SimulateOptions options;
         options.stop_requested = stop;

@@ -23,7 +23,7 @@ constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, fa
 constexpr int points_a_parameter = 12;  // of a spread
 constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
 constexpr int model_descents = 4;    // from the lowest of them
-constexpr int runs_across_kinks = 120;
+constexpr int runs_across_jumps = 200;  // for each parameter
 constexpr int most_polishing_steps = 15;
 constexpr double polishing_difference = 1e-5;
 constexpr int most_cheap_runs = 100000;
@@ -81,9 +81,9 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
     for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
         polish(cheap, order[static_cast<std::size_t>(i)].x);
     }
-    if (cheap.best()) {  // across kinks, where slopes mislead
-        Objective branch = cheap.branch(runs_across_kinks, objective.threads());
-        minimize(branch, cheap.best()->x, {"sbplx", seed});
+    if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes its shape
+        Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), objective.threads());
+        minimize(branch, cheap.best()->x, {"crs2", seed});
         cheap.join(branch);
         const Eigen::VectorXd best = cheap.best()->x;
         polish(cheap, best);

@@ -207,7 +207,7 @@ TEST(SlowChain, RingsWithMoreFrames) {
     expect_tips(command, block);
     const Outcome correlated = with_images(command, "correlate", block, "field.h5");
     ASSERT_EQ(correlated.status, 0) << correlated.error;
-    expect_fit(command, {{"EW.E", 150}, {"LW.E", 1500}, {"EW.toughness", 60}, {"LW.toughness", 120}}, 0.1);
+    expect_fit(command, {{"EW.E", 150}, {"LW.E", 1500}, {"EW.toughness", 60}, {"LW.toughness", 120}}, 0.05);
 }
 
 TEST(SystemChain, CameraRefusesWhatItCannotPhotograph) {

@@ -173,6 +173,44 @@ TEST(GradientRecord, OfAWedgeTest) {
     check("wedge", wedge_across_rings(0.4e-3), 1e-4, 3e-4);
 }
 
+// Displacements in the wood, on either side of the crack and ahead of it.
+void check_probes(const char* name, Scene scene, double tolerance, const std::vector<std::string>& keys) {
+    scene.output.probes = {{{1e-3, 7e-3}, {1.3e-3, 3.1e-3}, {4e-3, 8e-3}, {6e-3, 2e-3}, {8.9e-3, 5.2e-3}}, {}, true};
+    for (const double share : {0.2, 0.7, 0.95}) scene.output.probes.instants.push_back(share * *scene.stop.displacement);
+    KeptWalk walk(scene, numbers);
+    ASSERT_TRUE(walk.has_slopes());
+    const Record start = walk.run(scene, {});
+    ASSERT_EQ(start.probes.size(), 3u);
+    EXPECT_GT((start.probes.back().cracks[0].back() - scene.cracks[0].points.back()).norm(), 1e-3) << "it has grown";
+    for (const std::string& key : keys) {
+        const auto at = [&](double change) {
+            Scene other = scene;
+            set_number(other, key, get_number(scene, key) * (1.0 + change));
+            return other;
+        };
+        constexpr double small = 1e-6, step = 1e-4;
+        const Record more = walk.run(at(small), {}), less = walk.run(at(-small), {});
+        const Record far_more = KeptWalk(at(step)).run(at(step), {}), far_less = KeptWalk(at(-step)).run(at(-step), {});
+        double worst = 0, largest = 0;
+        for (std::size_t k = 0; k < scene.output.probes.instants.size(); ++k)
+            for (std::size_t i = 0; i < scene.output.probes.places.size(); ++i) {
+                const Vec2 slope = (more.probes[k].moved[i] - less.probes[k].moved[i]) / (2.0 * small);
+                const Vec2 difference = (far_more.probes[k].moved[i] - far_less.probes[k].moved[i]) / (2.0 * step);
+                worst = std::max(worst, (slope - difference).norm());
+                largest = std::max(largest, difference.norm());
+            }
+        std::printf("%s, probes by %s: %.1e of %.2e m\n", name, key.c_str(), worst / largest, largest);
+        EXPECT_LT(worst, tolerance * largest) << key;
+    }
+}
+
+TEST(GradientRecord, ProbesMoveWithTheNumbers) {
+    std::vector<std::string> keys = numbers;
+    keys.insert(keys.end(), {"materials.EW.toughness", "materials.LW.toughness"});
+    check_probes("linear", across_rings(0.4e-3), 1e-5, keys);
+    check_probes("wedge", wedge_across_rings(0.5e-3), 1e-5, keys);
+}
+
 TEST(GradientRecord, TractionMovesItsEdge) {
     Scene scene = across_rings(0.4e-3);
     scene.cracks[0].grows = Growth::none;

@@ -49,15 +49,10 @@ Experiment measure(Scene scene, MeasuredFields fields, double noise_px, unsigned
     const Record record = simulate(scene);
     std::mt19937 generator(seed);
     std::normal_distribution<double> normal;
-    const std::vector<double> weights = subset_weights(fields.order);
     for (const ProbeReading& reading : record.probes) {
         std::vector<Vec2>& moved = fields.moved.emplace_back();
-        for (std::size_t i = 0; i < fields.places.size(); ++i) {
-            Vec2 mean = Vec2::Zero();
-            for (std::size_t k = 0; k < weights.size(); ++k)
-                mean += weights[k] * reading.moved[weights.size() * i + k];
-            moved.push_back(mean + noise_px * pixel * Vec2(normal(generator), normal(generator)));
-        }
+        for (std::size_t i = 0; i < fields.places.size(); ++i)
+            moved.push_back(reading.moved[i] + noise_px * pixel * Vec2(normal(generator), normal(generator)));
         fields.sigma.emplace_back(fields.places.size(), noise_px * pixel);
     }
     double peak = 0;
@@ -175,8 +170,7 @@ TEST(UnitFields, PointsAtTheSimulatedCrackAreLeftOut) {
             const Vec2 off(std::max(0.0, 10e-3 - x.x()), x.y() - 5e-3);
             if (off.norm() < measured.fields->subset / std::sqrt(2.0) - 1e-12) {
                 ++near;
-                for (int k = 0; k < samples_a_subset; ++k)
-                    reading.moved[samples_a_subset * i + k] += Vec2(1e-3, 1e-3);
+                reading.moved[i] += Vec2(1e-3, 1e-3);
             }
         }
     }
