@@ -197,7 +197,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
     const Near rough = by_walk_of(&KeptWalks::rough);
     SearchResult found =
-        by_walks ? descend_by_walks(objective, near, rough, study.optimizer.starts, box.initial(), options.seed, stage)
+        by_walks ? descend_by_walks(objective, near, rough, study.optimizer.starts, walks.turn_with_toughness(), box.initial(), options.seed, stage)
                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
     for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
         // How well the model knows what it says shows where it fits.
@@ -211,7 +211,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             model.weigh(evaluation, box.values(run.x));
             return evaluation;
         });
-        found.converged = descend_again(objective, near, rough, options.seed);
+        found.converged = descend_again(objective, near, rough, walks.turn_with_toughness(), options.seed);
     }
     objective.set_budget_left(objective.budget_left() + reserve);
 

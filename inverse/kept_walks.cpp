@@ -58,16 +58,20 @@ class KeptWalks::Store {
     // On the walk of the scene with other values.
     Record run_near(const std::vector<double>& values, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         Scene base = scene;
-        for (const Setting& setting : others_) {
-            if (has(base, setting.key)) {
-                set_number(base, setting.key, setting.factor * values[setting.parameter]);
-            }
+        for (const Setting& setting : of_walk(scene)) {
+            set_number(base, setting.key, setting.factor * values[setting.parameter]);
         }
         return run(base, scene, rough, stop);
     }
 
     bool only_toughness() const {
-        return others_.empty() && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).reusable(); });
+        return others_.empty() && std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) {
+                   return KeptWalk(*scene).reusable() && !turns_with_toughness(*scene);
+               });
+    }
+
+    bool turn_with_toughness() const {
+        return std::any_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) { return turns_with_toughness(*scene); });
     }
 
     bool has_slopes() const {
@@ -88,10 +92,8 @@ class KeptWalks::Store {
         }
         return std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) {
             return std::all_of(scene->cracks.begin(), scene->cracks.end(), [&](const Crack& crack) {
-                const bool turns_with_moduli = crack.direction != GrowthDirection::straight;
-                const bool turns_with_toughness = crack.direction == GrowthDirection::energy_release_rate;
-                return crack.grows == Growth::none ||
-                       !((turns_with_moduli && !others_.empty()) || (turns_with_toughness && !toughness_.empty()));
+                return crack.grows == Growth::none || crack.direction == GrowthDirection::straight ||
+                       (others_.empty() && !turns_with_toughness(*scene));
             });
         });
     }
@@ -104,19 +106,35 @@ class KeptWalks::Store {
         return walk->reusable() ? walk->run(scene, options, rough) : simulate(scene, options);
     }
 
+    // Whether a crack goes another way through wood that is tougher.
+    bool turns_with_toughness(const Scene& scene) const {
+        return !toughness_.empty() && std::any_of(scene.cracks.begin(), scene.cracks.end(), [](const Crack& crack) {
+            return crack.grows != Growth::none && crack.direction == GrowthDirection::energy_release_rate;
+        });
+    }
+
+    // The scene's numbers that make another walk.
+    std::vector<Setting> of_walk(const Scene& scene) const {
+        std::vector<Setting> settings = others_;
+        if (turns_with_toughness(scene)) {
+            settings.insert(settings.end(), toughness_.begin(), toughness_.end());
+        }
+        std::erase_if(settings, [&](const Setting& setting) { return !has(scene, setting.key); });
+        return settings;
+    }
+
     // What tells walks apart: the scene as it was read, and what the fit has changed in it.
     std::string name_of(const Scene& scene) const {
         std::string name = scene.file.string() + '\n' + scene.text;
-        for (const Setting& setting : others_) {
-            name += has(scene, setting.key) ? fmt::format("\n{}={}", setting.key, get_number(scene, setting.key))
-                                            : "\n" + setting.key + " is not here";
+        for (const Setting& setting : of_walk(scene)) {
+            name += fmt::format("\n{}={}", setting.key, get_number(scene, setting.key));
         }
         return name;
     }
 
     std::shared_ptr<KeptWalk> new_walk(Scene scene) const {
         for (const Setting& setting : toughness_) {
-            if (has(scene, setting.key)) {
+            if (has(scene, setting.key) && !turns_with_toughness(scene)) {
                 set_number(scene, setting.key, setting.initial);
             }
         }
@@ -180,6 +198,7 @@ Forward KeptWalks::rough(const std::vector<double>& values) const {
 }
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
+bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
 bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }
 

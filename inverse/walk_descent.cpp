@@ -28,6 +28,10 @@ constexpr int most_polishing_steps = 15;
 constexpr double polishing_difference = 1e-5;
 constexpr int most_cheap_runs = 100000;
 
+// Where parameters turn the crack, what lies nearby tells of one way only:
+constexpr int starts_a_parameter = 6;
+constexpr int descents_of_starts = 3;
+
 // Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
 void polish(Objective& cheap, Eigen::VectorXd y) {
     const auto size = y.size();
@@ -135,34 +139,71 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
     return best.misfit < explained * static_cast<double>(std::max<Eigen::Index>(1, best.residuals.size() - parameters));
 }
 
-}  // namespace
-
-bool descend_again(Objective& objective, const Near& near, const Near& rough, unsigned seed) {
-    const Eigen::VectorXd start = objective.best()->x;
-    return descend_from(objective, near, rough, start, seed);
+// From the initial values and Sobol points of the box one step each, along the way that the crack goes there; the lowest first.
+std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed) {
+    std::vector<Eigen::VectorXd> starts = sobol_points(starts_a_parameter * static_cast<int>(initial.size()), initial.size(), seed);
+    starts.front() = initial;
+    objective.at(starts);
+    std::vector<Eigen::VectorXd> steps;
+    for (const Run& run : objective.runs()) {
+        if (run.evaluation->usable()) {
+            steps.push_back(lowest(near(run.x), Window(run.x, 1.0), run.x, objective, seed).x);
+        }
+    }
+    objective.at(steps);
+    std::vector<Run> order = objective.runs();
+    std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
+    starts.clear();
+    for (const Run& run : order) {
+        if (run.evaluation->usable() && static_cast<int>(starts.size()) < descents_of_starts) {
+            starts.push_back(run.x);
+        }
+    }
+    return starts;
 }
 
-SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
-                              unsigned seed, const std::function<void(const std::string&)>& stage) {
+}  // namespace
+
+bool descend_again(Objective& objective, const Near& near, const Near& rough, bool ways_differ, unsigned seed) {
+    const Eigen::VectorXd start = objective.best()->x;
+    const bool converged = descend_from(objective, near, rough, start, seed);
+    // From way to way the misfit is rough: polynomials of the runs themselves see past that.
+    return ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
+}
+
+SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, bool ways_differ,
+                              const Eigen::VectorXd& initial, unsigned seed, const std::function<void(const std::string&)>& stage) {
+    const int p = static_cast<int>(initial.size());
+    std::vector<Eigen::VectorXd> from{initial};
+    if (ways_differ) {
+        stage("starts");
+        from = lowest_of_starts(objective, rough, initial, seed);
+    }
+    for (int i = static_cast<int>(from.size()); i < starts; ++i) {
+        from.push_back(sobol_point(i, p, seed));
+    }
+    const int least_descents = ways_differ ? descents_of_starts : 0;
     stage("descent");
     SearchResult result;
+    double least = INFINITY;  // of the descents
     int descents = 0;
-    while (descents < starts && !objective.exhausted() &&
-           !(objective.best() && is_explained(*objective.best()->evaluation, initial.size()))) {
-        const double least = objective.best() ? objective.best()->evaluation->misfit : INFINITY;
+    while (descents < static_cast<int>(from.size()) && !objective.exhausted() &&
+           !(descents >= least_descents && objective.best() && is_explained(*objective.best()->evaluation, p))) {
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, near, rough, descents == 0 ? initial : sobol_point(descents, initial.size(), seed), seed);
+        const bool converged = descend_from(branch, near, rough, from[static_cast<std::size_t>(descents)], seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {
+            least = branch.best()->evaluation->misfit;
             result.converged = converged;
         }
     }
     result.method = fmt::format(
         "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other toughnesses as "
-        "they are, and other moduli moved by their exact derivatives. From the initial values, and from others, up to {}, while the "
+        "they are, and other moduli moved by their exact derivatives. From {}, and from others, up to {}, while the "
         "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
-        starts, descents, objective.runs().size());
+        ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
+        objective.runs().size());
     return result;
 }
 

@@ -15,12 +15,13 @@ using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 /// that is lower (Conn, Gould and Toint 2000, algorithm 6.1.1). The model is searched from several points, so that a curve
 /// with jumps does not easily catch it in a side valley. The search asks `rough`, which costs no equilibria; where that promises nothing
 /// more, `near` has the last word. It starts
-/// from `initial`, and from further Sobol points of the box, up to `starts`, as long as the noise does not explain the misfit.
-SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, const Eigen::VectorXd& initial,
-                              unsigned seed, const std::function<void(const std::string&)>& stage);
+/// from `initial`, and from further Sobol points of the box, up to `starts`, as long as the noise does not explain the misfit. Where
+/// `ways_differ` from point to point, which the cheap model does not see, it starts from the lowest of some more such points anyway.
+SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, bool ways_differ,
+                              const Eigen::VectorXd& initial, unsigned seed, const std::function<void(const std::string&)>& stage);
 
 /// One more such descent, from the best run, after runs have been weighed anew. Whether it ended by its own criterion.
-bool descend_again(Objective& objective, const Near& near, const Near& rough, unsigned seed);
+bool descend_again(Objective& objective, const Near& near, const Near& rough, bool ways_differ, unsigned seed);
 
 /// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.
 void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed);

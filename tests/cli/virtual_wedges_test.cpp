@@ -63,6 +63,20 @@ TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
+TEST(SlowVirtualWedges, TheRightDirectionCriterionIsRankedFirst) {
+    Command command;
+    const std::string told = virtual_wedges(command, "--scene inclined --seed 5 --count 2");
+    EXPECT_EQ(after(told, "right direction criterion ranked first: "), 2);
+}
+
+// Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is said to
+// lack something.
+TEST(SlowVirtualWedges, WhatTheModelLacksIsSaid) {
+    Command command;
+    EXPECT_EQ(after(virtual_wedges(command, "--scene graded --count 10"), "lack of fit said: "), 10);
+    EXPECT_LE(after(virtual_wedges(command, "--scene opened --count 10"), "lack of fit said: "), 1);
+}
+
 // Wheels: each equilibrium is found from those before it.
 TEST(SlowVirtualWedges, KilledFitsEndAtTheSameBits) {
     Command command;
