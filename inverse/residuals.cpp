@@ -145,6 +145,21 @@ double Comparison::shift_error(const Curve& force, double at, double sigma) cons
     return span > 0 ? (high - low) / span * sigma : 0.0;
 }
 
+// A fall of the force between two rows, as a jump of the crack makes it, was anywhere between them. What that does to the mean: the fall
+// times the standard deviation of its place, uniform between the rows, over the window.
+double Comparison::sampling_error(const Curve& rows, double at, double noise) const {
+    constexpr double clear = 5.0;  // of the noise: a difference of two rows has 1.4 of it
+    const double from = std::max(from_, at - 0.5 * window_), to = std::min(to_, at + 0.5 * window_);
+    double variance = 0;
+    for (std::size_t i = 0; i + 1 < rows.x().size(); ++i) {
+        const double fall = std::abs(rows.y()[i]) - std::abs(rows.y()[i + 1]);
+        if (fall > clear * noise && rows.x()[i] < to && rows.x()[i + 1] > from) {
+            variance += std::pow(fall * (rows.x()[i + 1] - rows.x()[i]) / (to - from), 2) / 12;
+        }
+    }
+    return std::sqrt(variance);
+}
+
 void Comparison::add_force_stations(const Experiment& experiment) {
     const Curve rows(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
@@ -169,7 +184,8 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         const double of_noise = noise / std::sqrt(averaged);
         const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
         const double of_model_place = shift_error(rows, at, model_resolution_ * at);
-        station.sigma = std::sqrt(of_noise * of_noise + of_data_place * of_data_place + of_model_place * of_model_place +
+        const double of_sampling = sampling_error(rows, at, noise);
+        station.sigma = std::sqrt(of_noise * of_noise + of_sampling * of_sampling + of_data_place * of_data_place + of_model_place * of_model_place +
                                   model_resolution_ * peak * model_resolution_ * peak);
         stations_.push_back(station);
     }

@@ -21,7 +21,8 @@ class Curve;
 /// curves get the same moving-window average, `smoothing_window` of the measured range wide, and the stations stand one
 /// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. With no
 /// more rows than that, a station stands on each row. Latewood bands that the crack crosses one by one leave peaks some
-/// tenth of the range apart, which a fiftieth keeps.
+/// tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next, as the crack jumps, when it did so is
+/// known to the rows' distance only, which counts as an error of its own.
 ///
 /// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth. What the
 /// crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a; it is never
@@ -61,6 +62,7 @@ class Comparison {
                     const std::optional<double>& given);
     double force_at(const Curve& force, double at) const;
     double shift_error(const Curve& force, double at, double sigma) const;
+    double sampling_error(const Curve& rows, double at, double noise) const;
 
     double model_resolution_;
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
