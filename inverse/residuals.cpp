@@ -67,6 +67,17 @@ double scatter(const Curve& rows) {
     return 1.4826 * *middle;
 }
 
+// Median of what a curve goes from row to row.
+double usual_step(const Curve& rows) {
+    std::vector<double> steps{0.0};
+    for (std::size_t i = 0; i + 1 < rows.y().size(); ++i) {
+        steps.push_back(std::abs(rows.y()[i + 1] - rows.y()[i]));
+    }
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle;
+}
+
 }  // namespace
 
 Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
@@ -146,14 +157,14 @@ double Comparison::shift_error(const Curve& force, double at, double sigma) cons
 }
 
 // A fall of the force between two rows, as a jump of the crack makes it, was anywhere between them. What that does to the mean: the fall
-// times the standard deviation of its place, uniform between the rows, over the window.
-double Comparison::sampling_error(const Curve& rows, double at, double noise) const {
-    constexpr double clear = 5.0;  // of the noise: a difference of two rows has 1.4 of it
+// times the standard deviation of its place, uniform between the rows, over the window. `usual` is what the force goes from row to row.
+double Comparison::sampling_error(const Curve& rows, double at, double usual) const {
+    constexpr double clear = 5.0;
     const double from = std::max(from_, at - 0.5 * window_), to = std::min(to_, at + 0.5 * window_);
     double variance = 0;
     for (std::size_t i = 0; i + 1 < rows.x().size(); ++i) {
         const double fall = std::abs(rows.y()[i]) - std::abs(rows.y()[i + 1]);
-        if (fall > clear * noise && rows.x()[i] < to && rows.x()[i + 1] > from) {
+        if (fall > clear * usual && rows.x()[i] < to && rows.x()[i + 1] > from) {
             variance += std::pow(fall * (rows.x()[i + 1] - rows.x()[i]) / (to - from), 2) / 12;
         }
     }
@@ -172,6 +183,7 @@ void Comparison::add_force_stations(const Experiment& experiment) {
     for (const double force : rows.y()) {
         peak = std::max(peak, std::abs(force));
     }
+    const double usual = std::max(noise, usual_step(rows));
     const int stations = sparse ? static_cast<int>(rows.x().size()) : tiles;
     for (int i = 0; i < stations; ++i) {
         const double at = sparse ? rows.x()[static_cast<std::size_t>(i)] : from_ + (i + 0.5) * window_;
@@ -184,7 +196,7 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         const double of_noise = noise / std::sqrt(averaged);
         const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
         const double of_model_place = shift_error(rows, at, model_resolution_ * at);
-        const double of_sampling = sampling_error(rows, at, noise);
+        const double of_sampling = sampling_error(rows, at, usual);
         station.sigma = std::sqrt(of_noise * of_noise + of_sampling * of_sampling + of_data_place * of_data_place + of_model_place * of_model_place +
                                   model_resolution_ * peak * model_resolution_ * peak);
         stations_.push_back(station);

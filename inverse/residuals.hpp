@@ -62,7 +62,7 @@ class Comparison {
                     const std::optional<double>& given);
     double force_at(const Curve& force, double at) const;
     double shift_error(const Curve& force, double at, double sigma) const;
-    double sampling_error(const Curve& rows, double at, double noise) const;
+    double sampling_error(const Curve& rows, double at, double usual) const;
 
     double model_resolution_;
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]

@@ -108,10 +108,10 @@ TEST(SystemExplore, ProfileAndPosteriorOfAWedgeTest) {
     FakeWedge wedge;
     wedge.sharpness = 1;
     Study study = wedge_study(wedge, 0.02, 1e-4, 7);
-    study.uncertainty = {true, 400};
+    study.uncertainty = {true, 1500};
     const Fit fit = fit_study(study, cheap(wedge, 1));
     EXPECT_EQ(fit.status, FitStatus::converged);
-    ASSERT_EQ(fit.posterior.size(), 400u);
+    ASSERT_EQ(fit.posterior.size(), 1500u);
     for (std::size_t j = 0; j < 2; ++j) {
         const FittedParameter& parameter = fit.parameters[j];
         EXPECT_LT(parameter.lower_95, parameter.value);
@@ -121,8 +121,8 @@ TEST(SystemExplore, ProfileAndPosteriorOfAWedgeTest) {
         EXPECT_NEAR((parameter.upper_95 - parameter.lower_95) / width, 1, 0.25);
         double mean = 0, square = 0;
         for (const PosteriorSample& sample : fit.posterior) {
-            mean += sample.parameters[j] / 400;
-            square += sample.parameters[j] * sample.parameters[j] / 400;
+            mean += sample.parameters[j] / 1500;
+            square += sample.parameters[j] * sample.parameters[j] / 1500;
         }
         const double sd = std::sqrt(square - mean * mean);
         std::printf("%s: best %.2f, profile %.2f .. %.2f, posterior %.2f +- %.2f, covariance +- %.2f\n", parameter.name.c_str(),
