@@ -105,7 +105,7 @@ class Quasistatic {
     std::vector<unsigned> fronts(int number, const MaterialMap& materials, int time) const;
     double drive(int number, const GrowingTip& tip, int time) const;
     Critical critical_of_front(int number, const MaterialMap& materials, double now, double until);
-    int time_from(double now) const;
+    int time_until(double now) const;
     bool fail();
     Quasistatic* coarse() const;
     bool know(std::size_t number, int time);

@@ -63,9 +63,9 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state) co
     return tip.position + growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
 }
 
-// The number of a time of the loading, not before `now`.
-int Quasistatic::time_from(double now) const {
-    return plan_.linear ? last_time_ : std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
+// The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
+int Quasistatic::time_until(double now) const {
+    return plan_.linear ? last_time_ : std::clamp(static_cast<int>(now / time_step_), 1, last_time_);
 }
 
 // The place where these tips have gone on by an increment; -1 where there is no equilibrium.
@@ -73,7 +73,7 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     Place& from = places_[number];
     if (!leader_) tips &= from.inside;
     if (const auto known = from.next.find(tips); known != from.next.end()) return known->second;
-    const int time = time_from(now);
+    const int time = time_until(now);
     if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
     if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
@@ -189,7 +189,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     const int here = way_[number];
     if (places_[here].station.left || growing_.empty()) return {};
     if (growing_.size() == 1) return critical_of_front(here, materials, now, never);
-    const int time = time_from(now);
+    const int time = time_until(now);
     if (!know(here, time)) {
         fail();
         return {};
@@ -249,6 +249,11 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         const MovingTip& tip = station.moving.front();
         return station.states.at(time).tips[2 * tip.crack + tip.at_end].G < far_below * toughness;
     };
+    // What a crack runs through without more load has been due before, and one state says so.
+    if (low > 0 && !far_from_critical(low)) {
+        if (!know_ahead(number, low)) return missing();
+        if (const Critical found = judge(); found.time <= time_of(low)) return found;
+    }
     while (high < last_time_ && time_of(high) < until && far_from_critical(high)) low = high++;
     while (true) {
         if (!know_ahead(number, low) || !know_ahead(number, high)) return missing();
