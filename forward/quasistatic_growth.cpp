@@ -185,10 +185,10 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
     return found;
 }
 
-Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now) {
+Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now, bool closely) {
     const int here = way_[number];
     if (places_[here].station.left || growing_.empty()) return {};
-    if (growing_.size() == 1) return critical_of_front(here, materials, now, never);
+    if (growing_.size() == 1) return critical_of_front(here, materials, now, never, closely);
     const int time = time_until(now);
     if (!know(here, time)) {
         fail();
@@ -210,7 +210,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     for (const Front& front : all) {
         if (moving != 0 && front.expected > far_above * std::max(now, first.time)) continue;
         if (!let_move(here, front.tips, now)) fail();
-        const Critical found = critical_of_front(here, materials, now, first.time);
+        const Critical found = critical_of_front(here, materials, now, first.time, closely);
         if (!failure_.empty()) return {};
         if (std::isfinite(found.time)) tried_[front.tips] = found.time * front.drive;
         if (moving != 0 && found.time >= first.time) continue;
@@ -222,7 +222,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
 }
 
 // When the front that is set to move from a place does, if that is before `until`.
-Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until) {
+Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until, bool closely) {
     const Station& station = places_[number].station;
     const double toughness = mean_toughness(materials, station.moving);
     const auto judge = [&]() -> Critical { return {station.critical_time(toughness, rough_), toughness}; };
@@ -249,10 +249,14 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         const MovingTip& tip = station.moving.front();
         return station.states.at(time).tips[2 * tip.crack + tip.at_end].G < far_below * toughness;
     };
-    // What a crack runs through without more load has been due before, and one state says so.
-    if (low > 0 && !far_from_critical(low)) {
-        if (!know_ahead(number, low)) return missing();
-        if (const Critical found = judge(); found.time <= time_of(low)) return found;
+    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new one.
+    int known = low;
+    const auto both_known = [&](int time) { return places_[number].states.count(time) && places_[places_[number].further].states.count(time); };
+    while (known > 0 && !closely && growing_.size() == 1 && !both_known(known)) --known;
+    for (const int time : {known, low}) {
+        if (time == 0 || far_from_critical(time)) continue;
+        if (!know_ahead(number, time)) return missing();
+        if (const Critical found = judge(); found.time <= time_of(time)) return found;
     }
     while (high < last_time_ && time_of(high) < until && far_from_critical(high)) low = high++;
     while (true) {
