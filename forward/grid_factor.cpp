@@ -21,6 +21,9 @@ constexpr int leaf_cells = 4;  // boxes no wider than this are not halved: measu
 // Below this many unknowns a call into the BLAS costs more than the work: measured.
 constexpr int small_front = 48;
 
+// So many right sides are solved one after the other.
+constexpr int few_columns = 3;
+
 // Runs two tasks side by side, or one after the other.
 template <class First, class Second>
 void run_both(bool side_by_side, const First& first, const Second& second) {
@@ -388,8 +391,8 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 }
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {
-    if (right.cols() == 1) solve_one(right.data());
-    else solve_columns(right);
+    if (right.cols() > few_columns) return solve_columns(right);
+    for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c).data());
 }
 
 double GridFactor::reciprocal_condition() const {
