@@ -181,17 +181,21 @@ double Station::critical_time(double toughness, bool beyond) const {
         slope.push_back(finite_advance ? state.power - further->second[1] : 0.0);
     }
     if (time.empty()) return never;
-    const auto power_law = [&](std::size_t from, std::size_t to, std::size_t start) {
-        const double ratio = (excess[to] + needed) / (excess[from] + needed);
-        const double power = ratio > 0.0 && time[from] > 0.0 && to != from ? std::log(ratio) / std::log(time[to] / time[from]) : 2.0;
-        return time[start] * std::pow(needed / (excess[start] + needed), 1.0 / std::max(power, 0.5));
+    // From a state on as a power of the time: the one that its slope says or, without, the next state.
+    const auto power_law = [&](std::size_t start, std::size_t other) {
+        const double released = excess[start] + needed;
+        const double ratio = (excess[other] + needed) / released;
+        double power = 2.0;
+        if (finite_advance) power = slope[start] * time[start] / released;
+        else if (ratio > 0.0 && time[other] > 0.0 && other != start) power = std::log(ratio) / std::log(time[other] / time[start]);
+        return time[start] * std::pow(needed / released, 1.0 / std::max(power, 0.5));
     };
     if (beyond && excess.back() < 0.0) {
         const std::size_t last = time.size() - 1;
-        const double reached = excess[last] + needed > 0.0 ? power_law(last > 0 ? last - 1 : last, last, last) : never;
+        const double reached = excess[last] + needed > 0.0 ? power_law(last, last > 0 ? last - 1 : last) : never;
         return reached <= still_from * (1.0 + 1e-12) ? reached : never;
     }
-    if (time.size() == 1) return beyond ? power_law(0, 0, 0) : excess[0] >= 0.0 ? time[0] : never;
+    if (time.size() == 1) return beyond || (excess[0] >= 0.0 && time[0] > 0.0) ? power_law(0, 0) : excess[0] >= 0.0 ? 0.0 : never;
     double found = never;
     if (linear) {  // times 0, T/2, T
         const double T = time[2];
@@ -206,7 +210,7 @@ double Station::critical_time(double toughness, bool beyond) const {
         if (excess[i - 1] >= 0.0) {
             // Below what is known: the energy released goes as a power of the time.
             if (time[i - 1] == 0.0) return 0.0;
-            return power_law(i - 1, i, i - 1);
+            return power_law(i - 1, i);
         }
         double low = 0.0, high = 1.0;
         for (int k = 0; k < 60; ++k) {

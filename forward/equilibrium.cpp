@@ -28,9 +28,12 @@ constexpr double least_reciprocal_condition = 1e-10;
 
 // An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
 // as much as a new one.
-constexpr double worth_keeping = 5.0;
+constexpr double worth_keeping = 2.0;
 // With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
 constexpr double worth_keeping_with_friction = 0.25;
+// A cell keeps its part of the factor until its displacement gradient has changed by this much. The forces are exact all the same; the
+// steps, with a tangent that is wrong by about that part, are hardly more (measured: 0.003 to 0.03 take the same time).
+constexpr double slack_of_tangent = 0.005;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -118,6 +121,7 @@ Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const {
 
 // Forces out of balance, reactions, and the energies that are not the points'.
 void Equilibrium::find_forces() {
+    potential_.reset();
     force_.assign(displacement_.size(), Vec2::Zero());
     reaction_.assign(boundary_.drivers(), Vec2::Zero());
     internal_force_.add(displacement_, force_);
@@ -252,6 +256,7 @@ void Equilibrium::add_touches(bool geometric) {
             for (int a = 0; a < 4; ++a)
                 for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
             add_extra(body_.points.cell[facet.point], fields, tangent);
+            touched_cells_.push_back(body_.points.cell[facet.point]);
             if (touch.drag.limit > 0.0) add_rubbing(fields, facet.weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
             // The other end of the spring is the body.
             std::array<int, 10> rows;
@@ -273,9 +278,24 @@ void Equilibrium::add_touches(bool geometric) {
     }
 }
 
-// In a linear scene only what a growing crack has changed is factored anew.
-bool Equilibrium::factor_tangent(bool geometric) {
-    if (!plan_.linear || !free_.empty()) factor_.mark_all();
+// Marks where the tangent is not, to within `slack`, what it was when it was factored. What a growing crack changes is marked already,
+// and in a linear scene that is all.
+void Equilibrium::mark_changes(bool geometric, double slack) {
+    const bool other_kind = std::exchange(factored_geometric_, geometric) != geometric;
+    if (!free_.empty() || plan_.friction || history_ || other_kind) factor_.mark_all();
+    if (plan_.linear) return;
+    factored_at_.resize(body_.points.count(), Mat2::Constant(INFINITY));
+    for (int c = 0; c < body_.layout.cells(); ++c)
+        for_groups_of(c, [&](std::span<const int>, int first, int) {
+            const Mat2 change = gradient_at(body_, first, displacement_) - factored_at_[first];
+            if (!(change.cwiseAbs().maxCoeff() <= slack)) factor_.mark(c);
+        });
+}
+
+// The tangent where it stands; with `slack`, of gradients that differ from these by so much at most.
+bool Equilibrium::factor_tangent(bool geometric, double slack) {
+    mark_changes(geometric, slack);
+    for (const int c : std::exchange(touched_cells_, {})) factor_.mark(c);  // bodies may have left them
     const int free = static_cast<int>(free_.size());
     step_load_.setZero(equations_ + free);
     free_load_.setZero(equations_, free);
@@ -287,10 +307,12 @@ bool Equilibrium::factor_tangent(bool geometric) {
     add_pairs();
     add_touches(geometric);
     couple_points(geometric);
+    for (const int c : touched_cells_) factor_.mark(c);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
         for_groups_of(cell, [&](std::span<const int> fields, int first_point, int count) {
             elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
+            if (!plan_.linear) factored_at_[first_point] = gradient_at(body_, first_point, displacement_);
         });
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
@@ -373,17 +395,16 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
     if (history_) history_->go_to(time);
     bool renew = true;
-    double residual = 0.0;
+    find_forces();
+    double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
-        find_forces();
-        if (iteration == 0) residual = largest_residual();
         // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-        if (renew && !factor_tangent(true) && !factor_tangent(false)) {
+        if (renew && !factor_tangent(true, slack_of_tangent) && !factor_tangent(false, slack_of_tangent)) {
             if (time_ == time) return Outcome::mechanism;
             time_ = time;  // held by bodies that do not touch yet, perhaps: try with these where they are going
             std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
             find_forces();
-            if (!factor_tangent(true) && !factor_tangent(false)) return Outcome::mechanism;
+            if (!factor_tangent(true, slack_of_tangent) && !factor_tangent(false, slack_of_tangent)) return Outcome::mechanism;
         }
         const Eigen::VectorXd start = out_of_balance();
         const Eigen::VectorXd step = newton_step(start + step_load_);
@@ -428,7 +449,8 @@ double Equilibrium::traction_work() const {
 }
 
 double Equilibrium::potential() const {
-    return strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+    if (!potential_) potential_ = strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+    return *potential_;
 }
 
 double Equilibrium::measured_displacement(double time) const {
@@ -453,7 +475,7 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
 }
 
 // Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
-void Equilibrium::mark_changes(const PointTable<int>& before) {
+void Equilibrium::mark_moved_points(const PointTable<int>& before) {
     int last = -1;
     for (int p = 0; p < body_.points.count(); ++p) {
         const int c = body_.points.cell[p];
@@ -477,7 +499,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     set_contacts(snapshot.contacts);
     internal_force_.sort_cells();
     renumber();
-    mark_changes(before);
+    mark_moved_points(before);
     find_forces();
 }
 

@@ -11,6 +11,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -113,9 +114,10 @@ class Equilibrium {
   private:
     TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
     void renumber();
-    void mark_changes(const PointTable<int>& fields_before);
+    void mark_moved_points(const PointTable<int>& fields_before);
+    void mark_changes(bool geometric, double slack);
     void find_forces();
-    bool factor_tangent(bool geometric);
+    bool factor_tangent(bool geometric, double slack = 0.0);
     GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
     void couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void couple_points(bool geometric);
@@ -175,6 +177,7 @@ class Equilibrium {
     double least_force_ = 0;          // [N]
     double contact_energy_ = 0;       // [J]
     double face_energy_ = 0;          // [J]
+    mutable std::optional<double> potential_;  // [J]; empty: not asked for since the forces were found
     double time_ = 0;                 // [s]
     double next_time_ = 0;            // that is being solved for [s]
     std::vector<Vec2> still_to_go_;   // [drivers] until then [m]
@@ -187,6 +190,9 @@ class Equilibrium {
     std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
     std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
     Eigen::VectorXd step_load_;       // what that puts on the equations and the free bodies [N]
+    std::vector<Mat2> factored_at_;   // [points] gradient at which its cell was factored; of points on the same fields the first counts
+    bool factored_geometric_ = true;  // how
+    std::vector<int> touched_cells_;  // by bodies, in the factor
     int factorisations_ = 0;
     struct Lesson {
         Eigen::VectorXd step;         // that was taken [m]

@@ -2,7 +2,6 @@
 #include "forward/equilibrium.hpp"
 
 #include <algorithm>
-#include <optional>
 
 namespace crampfit {
 
@@ -11,29 +10,6 @@ namespace crampfit {
 // feels is the slope of the potential along a motion m that it brings about, R = dPi/ds; the derivative of that is again explicit,
 // dR/dp = sum of V dW_p/d(grad u) : grad m, whatever u does, as long as m is an equilibrium's own motion (symmetry of the
 // second derivatives).
-
-namespace {
-
-Eigen::Vector4d in_turned_frame(const Polar& polar, const Mat2& gradient) {
-    const Mat2 local = polar.turn.transpose() * gradient;
-    return {local(0, 0), local(0, 1), local(1, 0), local(1, 1)};
-}
-
-// Rate of a point's strain for each displacement component of its cell's nodes [1/m].
-Eigen::Matrix<double, 3, 8> strain_rates(const CellWeights& w, const Polar* polar) {
-    Eigen::Matrix<double, 3, 8> rates;
-    for (int k = 0; k < 4; ++k) {
-        for (int axis = 0; axis < 2; ++axis) {
-            Mat2 gradient = Mat2::Zero();
-            gradient.row(axis) << w.slope_x[k], w.slope_y[k];
-            if (polar) rates.col(2 * k + axis) = polar->strain_slope() * in_turned_frame(*polar, gradient);
-            else rates.col(2 * k + axis) << gradient(0, 0), gradient(1, 1), gradient(0, 1) + gradient(1, 0);
-        }
-    }
-    return rates;
-}
-
-} // namespace
 
 // What motions of the drivers put on the equations, by the tangent where it stands.
 Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
@@ -97,18 +73,12 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         const auto changes = [&](const MaterialSlope& number) { return !number.stiffness(points.cell[p]).isZero(0.0); };
         if (std::none_of(numbers.begin(), numbers.end(), changes)) continue;
         const Mat2 gradient = gradient_at(body_, p, displacement_);
-        Eigen::Vector3d strain(gradient(0, 0), gradient(1, 1), gradient(0, 1) + gradient(1, 0));
-        std::optional<Polar> polar;
-        if (plan_.rotates) {
-            polar.emplace(gradient);
-            strain << polar->stretch(0, 0) - 1.0, polar->stretch(1, 1) - 1.0, 2.0 * polar->stretch(0, 1);
-        }
-        const Eigen::Matrix<double, 3, 8> rates = strain_rates(body_.weights[points.slot[p]], polar ? &*polar : nullptr);
+        const CellWeights& w = body_.weights[points.slot[p]];
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             if (!changes(numbers[n])) continue;
-            const Eigen::Vector3d stress = points.volume[p] * (numbers[n].stiffness(points.cell[p]) * strain);
-            slope.potential[n] += 0.5 * stress.dot(strain);
-            for (int k = 0; k < 4; ++k) add(n, points.node[p][k], rates.middleCols<2>(2 * k).transpose() * stress);
+            const PointState state = elastic_state(gradient, numbers[n].stiffness(points.cell[p]), plan_.rotates);
+            slope.potential[n] += points.volume[p] * state.energy;
+            for (int k = 0; k < 4; ++k) add(n, points.node[p][k], points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k])));
         }
     }
     for (const UnevenCells::Piece& piece : internal_force_.uneven().pieces()) {

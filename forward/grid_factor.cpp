@@ -21,6 +21,9 @@ constexpr int leaf_cells = 4;  // boxes no wider than this are not halved: measu
 // Below this many unknowns a call into the BLAS costs more than the work: measured.
 constexpr int small_front = 48;
 
+// So many right sides are solved one after the other.
+constexpr int few_columns = 3;
+
 // Runs two tasks side by side, or one after the other.
 template <class First, class Second>
 void run_both(bool side_by_side, const First& first, const Second& second) {
@@ -277,10 +280,81 @@ void GridFactor::downward(int top, int forks, const Visit& visit) const {
     run_both(true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
 }
 
-// One right side or many: single columns have quicker kernels.
-template <class Columns>
-void GridFactor::solve_columns(Columns x) const {
-    using Part = Eigen::Matrix<double, Eigen::Dynamic, Columns::ColsAtCompileTime>;
+// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at a
+// time: most of the work is to fetch them.
+void GridFactor::forward_columns(const Eigen::MatrixXd& factor, double* y) {
+    const auto rows = factor.rows(), columns = factor.cols();
+    for (Eigen::Index c = 0; c < columns;) {
+        const auto width = std::min<Eigen::Index>(4, columns - c);
+        for (Eigen::Index a = c; a < c + width; ++a) {
+            y[a] /= factor(a, a);
+            for (Eigen::Index r = a + 1; r < c + width; ++r) y[r] -= factor(r, a) * y[a];
+        }
+        if (width == 4) {
+            const double *l0 = &factor(0, c), *l1 = l0 + rows, *l2 = l1 + rows, *l3 = l2 + rows;
+            const double y0 = y[c], y1 = y[c + 1], y2 = y[c + 2], y3 = y[c + 3];
+            for (Eigen::Index r = c + 4; r < rows; ++r) y[r] -= l0[r] * y0 + l1[r] * y1 + l2[r] * y2 + l3[r] * y3;
+        } else {
+            for (Eigen::Index a = c; a < c + width; ++a)
+                for (Eigen::Index r = c + width; r < rows; ++r) y[r] -= factor(r, a) * y[a];
+        }
+        c += width;
+    }
+}
+
+// The other way: y := L^-T (y - L_bi^T y of the border).
+void GridFactor::backward_columns(const Eigen::MatrixXd& factor, double* y) {
+    const auto rows = factor.rows(), columns = factor.cols();
+    for (Eigen::Index end = columns; end > 0;) {
+        const auto width = end % 4 == 0 ? 4 : end % 4;
+        const auto c = end - width;
+        const auto below = Eigen::Map<const Eigen::VectorXd>(y + end, rows - end);
+        if (width == 4) {
+            const Eigen::Vector4d sum = factor.block<Eigen::Dynamic, 4>(end, c, rows - end, 4).transpose() * below;
+            for (int a = 0; a < 4; ++a) y[c + a] -= sum[a];
+        } else {
+            for (Eigen::Index a = c; a < end; ++a) y[a] -= factor.col(a).tail(rows - end).dot(below);
+        }
+        for (Eigen::Index a = end - 1; a >= c; --a) {
+            for (Eigen::Index r = a + 1; r < end; ++r) y[a] -= factor(r, a) * y[r];
+            y[a] /= factor(a, a);
+        }
+        end = c;
+    }
+}
+
+// One right side.
+void GridFactor::solve_one(double* x) const {
+    std::vector<std::size_t> at(boxes_.size() + 1, 0);
+    for (std::size_t b = 0; b < boxes_.size(); ++b) at[b + 1] = at[b] + boxes_[b].inner + boxes_[b].border;
+    std::vector<double> fronts(at.back());  // of each box: its own unknowns, then what it leaves for the box that it is a half of
+    const int top = static_cast<int>(boxes_.size()) - 1;
+    upward(top, forks_, [&](int b) {
+        const Box& box = boxes_[b];
+        double* y = &fronts[at[b]];
+        if (box.inner > 0) std::copy_n(x + first_[box.nodes[0]], box.inner, y);
+        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
+            const double* from = &fronts[at[box.half[h]]] + boxes_[box.half[h]].inner;
+            for (const int slot : box.slot[h])
+                for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) y[to] += *from++;
+        }
+        if (std::any_of(y, y + box.inner, [](double value) { return value != 0.0; })) forward_columns(box.factor, y);
+    });
+    downward(top, forks_, [&](int b) {
+        const Box& box = boxes_[b];
+        if (box.inner == 0) return;
+        double* y = &fronts[at[b]];
+        double* border = y + box.inner;
+        for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
+            border = std::copy_n(x + first_[box.nodes[k]], count_[box.nodes[k]], border);
+        backward_columns(box.factor, y);
+        std::copy_n(y, box.inner, x + first_[box.nodes[0]]);
+    });
+}
+
+// Many.
+void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
+    using Part = Eigen::MatrixXd;
     std::vector<Part> left(boxes_.size());  // [boxes][border x columns] what each leaves for the box that it is a half of
     const int top = static_cast<int>(boxes_.size()) - 1;
     upward(top, forks_, [&](int b) {
@@ -300,7 +374,7 @@ void GridFactor::solve_columns(Columns x) const {
         }
         auto own = x.middleRows(first, box.inner);
         if (own.isZero(0.0)) return;
-        box.factor.topRows(box.inner).template triangularView<Eigen::Lower>().solveInPlace(own);
+        box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
         left[b].noalias() -= box.factor.bottomRows(box.border) * own;
     });
     downward(top, forks_, [&](int b) {
@@ -312,13 +386,13 @@ void GridFactor::solve_columns(Columns x) const {
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
             for (int e = 0; e < count_[box.nodes[k]]; ++e) at_border.row(row++) = x.row(first_[box.nodes[k]] + e);
         own.noalias() -= box.factor.bottomRows(box.border).transpose() * at_border;
-        box.factor.topRows(box.inner).template triangularView<Eigen::Lower>().transpose().solveInPlace(own);
+        box.factor.topRows(box.inner).triangularView<Eigen::Lower>().transpose().solveInPlace(own);
     });
 }
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {
-    if (right.cols() == 1) solve_columns(right.col(0));
-    else solve_columns(right.leftCols(right.cols()));
+    if (right.cols() > few_columns) return solve_columns(right);
+    for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c).data());
 }
 
 double GridFactor::reciprocal_condition() const {

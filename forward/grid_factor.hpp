@@ -82,8 +82,10 @@ class GridFactor {
     void upward(int top, int forks, const Visit& visit) const;
     template <class Visit>
     void downward(int top, int forks, const Visit& visit) const;
-    template <class Columns>
-    void solve_columns(Columns x) const;
+    static void forward_columns(const Eigen::MatrixXd& factor, double* y);
+    static void backward_columns(const Eigen::MatrixXd& factor, double* y);
+    void solve_one(double* right) const;
+    void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;
     int placed_ = 0;                 // nodes that have a place

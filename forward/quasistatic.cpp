@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <limits>
 
 namespace crampfit {
@@ -41,9 +42,10 @@ struct Quasistatic::Coarse {
     Scene scene;
     MaterialMap materials;
     Quasistatic walk;
+    bool side_by_side;  // with the finer grid's
 
     Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader) {}
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader), side_by_side(threads > 1) {}
 };
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
@@ -224,15 +226,25 @@ void Quasistatic::shift(const std::vector<double>& by) {
         for (const auto& [time, slopes] : places_[number].slopes) show_shifted(number, time);
 }
 
+// Solves for something on both grids; whether it succeeded on the second, and on this one.
+template <class Second, class Own>
+std::pair<bool, bool> Quasistatic::on_both_grids(const Second& second, const Own& own) {
+    if (!coarse_) return {true, own()};
+    std::future<bool> other = std::async(coarse_->side_by_side ? std::launch::async : std::launch::deferred, second);
+    const bool good = own();
+    return {other.get(), good};
+}
+
 // In a linear scene no load and full load say all; the state half way is between them.
 bool Quasistatic::know_linear(std::size_t number) {
-    if (coarse_ && !coarse_->walk.follow_leader(number)) return false;
+    const auto follow = [&] { return coarse_->walk.follow_leader(number); };
     const auto solve = [&](int time) {
         ++equilibria_;
         return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
     };
     if (!equilibrium_.boundary().has_dead_load()) {  // all goes with the load or its square
-        const bool good = solve(2);
+        const auto [second, good] = on_both_grids(follow, [&] { return solve(2); });
+        if (!second) return false;
         if (!good && !places_[number].station.left) return false;
         const LoadState full = good ? load_state() : nothing(time_of(2));
         if (good) keep_probes(number, 2);
@@ -251,7 +263,7 @@ bool Quasistatic::know_linear(std::size_t number) {
         }
         return true;
     }
-    if (!solve(0)) return false;
+    if (const auto [second, good] = on_both_grids(follow, [&] { return solve(0); }); !second || !good) return false;
     const std::vector<Vec2> unloaded = equilibrium_.displacements();
     const Equilibrium::Contacts before = equilibrium_.contacts();
     if (plan_.driven && !solve(2)) return false;
@@ -427,14 +439,17 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
-    if (coarse_ && !(coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time))) return false;
-    if (time == 0 && !equilibrium_.boundary().has_dead_load()) {
+    const bool at_rest = time == 0 && !equilibrium_.boundary().has_dead_load();
+    const auto [second, good] = on_both_grids([&] { return coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time); },
+                                              [&] { return at_rest || solve_for(number, time); });
+    if (!second) return false;
+    if (at_rest) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};
         keep(number, 0, nothing(0.0));
         return true;
     }
-    if (solve_for(number, time)) {
+    if (good) {
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
         keep_probes(number, time);

@@ -54,8 +54,9 @@ class Quasistatic {
         double toughness = 0;                                   // that it overcomes: the mean over the route [J/m^2]
     };
 
-    /// When the crack moves on from a station if the wood is as tough as this; where that was due before `now`, roughly when.
-    Critical critical(std::size_t station, const MaterialMap& materials, double now);
+    /// When the crack moves on from a station if the wood is as tough as this. Where that was due before `now`, roughly when: from
+    /// what is known already or, `closely`, from a state not long before.
+    Critical critical(std::size_t station, const MaterialMap& materials, double now, bool closely = false);
 
     /// What a station is like at a time.
     LoadState at(std::size_t station, double time);
@@ -112,8 +113,8 @@ class Quasistatic {
     void keep_only_from(int number);
     std::vector<unsigned> fronts(int number, const MaterialMap& materials, int time) const;
     double drive(int number, const GrowingTip& tip, int time) const;
-    Critical critical_of_front(int number, const MaterialMap& materials, double now, double until);
-    int time_from(double now) const;
+    Critical critical_of_front(int number, const MaterialMap& materials, double now, double until, bool closely);
+    int time_until(double now) const;
     bool fail();
     Quasistatic* coarse() const;
     bool know(std::size_t number, int time);
@@ -121,6 +122,8 @@ class Quasistatic {
     bool guess(std::size_t number, int time);
     void forget_guesses();
     bool find(std::size_t number, int time);
+    template <class Second, class Own>
+    std::pair<bool, bool> on_both_grids(const Second& second, const Own& own);
     bool know_linear(std::size_t number);
     bool solve_for(std::size_t number, int time);
     bool solve_predicted(std::size_t number, int time);

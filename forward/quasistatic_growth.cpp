@@ -63,9 +63,9 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state) co
     return tip.position + growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
 }
 
-// The number of a time of the loading, not before `now`.
-int Quasistatic::time_from(double now) const {
-    return plan_.linear ? last_time_ : std::clamp(static_cast<int>(std::ceil(now / time_step_)), 1, last_time_);
+// The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
+int Quasistatic::time_until(double now) const {
+    return plan_.linear ? last_time_ : std::clamp(static_cast<int>(now / time_step_), 1, last_time_);
 }
 
 // The place where these tips have gone on by an increment; -1 where there is no equilibrium.
@@ -73,7 +73,7 @@ int Quasistatic::next(int number, unsigned tips, double now) {
     Place& from = places_[number];
     if (!leader_) tips &= from.inside;
     if (const auto known = from.next.find(tips); known != from.next.end()) return known->second;
-    const int time = time_from(now);
+    const int time = time_until(now);
     if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
     if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
@@ -185,11 +185,11 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
     return found;
 }
 
-Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now) {
+Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now, bool closely) {
     const int here = way_[number];
     if (places_[here].station.left || growing_.empty()) return {};
-    if (growing_.size() == 1) return critical_of_front(here, materials, now, never);
-    const int time = time_from(now);
+    if (growing_.size() == 1) return critical_of_front(here, materials, now, never, closely);
+    const int time = time_until(now);
     if (!know(here, time)) {
         fail();
         return {};
@@ -210,7 +210,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
     for (const Front& front : all) {
         if (moving != 0 && front.expected > far_above * std::max(now, first.time)) continue;
         if (!let_move(here, front.tips, now)) fail();
-        const Critical found = critical_of_front(here, materials, now, first.time);
+        const Critical found = critical_of_front(here, materials, now, first.time, closely);
         if (!failure_.empty()) return {};
         if (std::isfinite(found.time)) tried_[front.tips] = found.time * front.drive;
         if (moving != 0 && found.time >= first.time) continue;
@@ -222,7 +222,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
 }
 
 // When the front that is set to move from a place does, if that is before `until`.
-Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until) {
+Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until, bool closely) {
     const Station& station = places_[number].station;
     const double toughness = mean_toughness(materials, station.moving);
     const auto judge = [&]() -> Critical { return {station.critical_time(toughness, rough_), toughness}; };
@@ -249,6 +249,15 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         const MovingTip& tip = station.moving.front();
         return station.states.at(time).tips[2 * tip.crack + tip.at_end].G < far_below * toughness;
     };
+    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new one.
+    int known = low;
+    const auto both_known = [&](int time) { return places_[number].states.count(time) && places_[places_[number].further].states.count(time); };
+    while (known > 0 && !closely && growing_.size() == 1 && !both_known(known)) --known;
+    for (const int time : {known, low}) {
+        if (time == 0 || far_from_critical(time)) continue;
+        if (!know_ahead(number, time)) return missing();
+        if (const Critical found = judge(); found.time <= time_of(time)) return found;
+    }
     while (high < last_time_ && time_of(high) < until && far_from_critical(high)) low = high++;
     while (true) {
         if (!know_ahead(number, low) || !know_ahead(number, high)) return missing();

@@ -171,6 +171,7 @@ class Tracer {
         Moment after = moment(next, now);
         const bool arrests = !walk_.station(next).left && critical_[next] > now;
         if (arrests && std::isfinite(critical_[next])) {
+            if (!plan_.linear && growing_tips(scene_) == 1) critical_[next - 1] = walk_.critical(next - 1, materials_, now, true).time;
             const double s = (now - critical_[next - 1]) / (critical_[next] - critical_[next - 1]);
             after = mixed(moment(next - 1, now), after, std::clamp(s, 0.0, 1.0));
         } else if (beyond_length(after) && length_of(after) > *scene_.stop.crack_length) {
