@@ -174,7 +174,7 @@ TEST(GradientRecord, OfAWedgeTest) {
 }
 
 // Displacements in the wood, on either side of the crack and ahead of it.
-void check_probes(const char* name, Scene scene, double tolerance, const std::vector<std::string>& keys) {
+void check_probes(const char* name, Scene scene, double step, const std::vector<std::string>& keys) {
     scene.output.probes = {{{1e-3, 7e-3}, {1.3e-3, 3.1e-3}, {4e-3, 8e-3}, {6e-3, 2e-3}, {8.9e-3, 5.2e-3}}, {}, true};
     for (const double share : {0.2, 0.7, 0.95}) scene.output.probes.instants.push_back(share * *scene.stop.displacement);
     KeptWalk walk(scene, numbers);
@@ -188,7 +188,7 @@ void check_probes(const char* name, Scene scene, double tolerance, const std::ve
             set_number(other, key, get_number(scene, key) * (1.0 + change));
             return other;
         };
-        constexpr double small = 1e-6, step = 1e-4;
+        constexpr double small = 1e-6;
         const Record more = walk.run(at(small), {}), less = walk.run(at(-small), {});
         const Record far_more = KeptWalk(at(step)).run(at(step), {}), far_less = KeptWalk(at(-step)).run(at(-step), {});
         double worst = 0, largest = 0;
@@ -200,15 +200,15 @@ void check_probes(const char* name, Scene scene, double tolerance, const std::ve
                 largest = std::max(largest, difference.norm());
             }
         std::printf("%s, probes by %s: %.1e of %.2e m\n", name, key.c_str(), worst / largest, largest);
-        EXPECT_LT(worst, tolerance * largest) << key;
+        EXPECT_LT(worst, 1e-5 * largest) << key;
     }
 }
 
 TEST(GradientRecord, ProbesMoveWithTheNumbers) {
     std::vector<std::string> keys = numbers;
     keys.insert(keys.end(), {"materials.EW.toughness", "materials.LW.toughness"});
-    check_probes("linear", across_rings(0.4e-3), 1e-5, keys);
-    check_probes("wedge", wedge_across_rings(0.5e-3), 1e-5, keys);
+    check_probes("linear", across_rings(0.4e-3), 1e-4, keys);
+    check_probes("wedge", wedge_across_rings(0.5e-3), 5e-4, keys);  // what Newton's method leaves counts in a smaller step
 }
 
 TEST(GradientRecord, TractionMovesItsEdge) {
