@@ -31,9 +31,11 @@ constexpr double least_reciprocal_condition = 1e-10;
 constexpr double worth_keeping = 2.0;
 // With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
 constexpr double worth_keeping_with_friction = 0.25;
-// A cell keeps its part of the factor until its displacement gradient has changed by this much. The forces are exact all the same; the
-// steps, with a tangent that is wrong by about that part, are hardly more (measured: 0.003 to 0.03 take the same time).
+// A cell keeps its part of the factor until its displacement gradient has changed by this much, and for so many iterations of a solution.
+// Forces are exact all the same, and the steps hardly more (measured: 0.003 to 0.03 take the same time). For the many equilibria,
+// much alike, of a growing crack: else the tangent is exact, which keeps mirror images what they are where equilibrium is unstable.
 constexpr double slack_of_tangent = 0.005;
+constexpr int quick_iterations = 10;
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -395,16 +397,18 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     prescribe(time);
     if (history_) history_->go_to(time);
     bool renew = true;
+    double slack = plan_.grows ? slack_of_tangent : 0.0;
+    // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
+    const auto factor = [&] { return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0); };
     find_forces();
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
-        // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-        if (renew && !factor_tangent(true, slack_of_tangent) && !factor_tangent(false, slack_of_tangent)) {
+        if (renew && !factor()) {
             if (time_ == time) return Outcome::mechanism;
             time_ = time;  // held by bodies that do not touch yet, perhaps: try with these where they are going
             std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
             find_forces();
-            if (!factor_tangent(true, slack_of_tangent) && !factor_tangent(false, slack_of_tangent)) return Outcome::mechanism;
+            if (!factor()) return Outcome::mechanism;
         }
         const Eigen::VectorXd start = out_of_balance();
         const Eigen::VectorXd step = newton_step(start + step_load_);
@@ -426,6 +430,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             settle();
             return Outcome::solved;
         }
+        if (iteration >= quick_iterations) slack = 0.0;
         renew = plan_.friction ? residual > worth_keeping_with_friction * before
               : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
