@@ -28,9 +28,10 @@ struct View {
     const CrackFields& cracks;
     const std::vector<Vec2>& displacement;
     Vec2 origin;  // of its lower left corner in the specimen [m]
+    int crack;    // its number there
 
-    /// The point nearest to a place on the same side of a crack; -1: none near it is.
-    int point_beside(const Vec2& x, int crack) const {
+    /// The point nearest to a place on the same side of the crack; -1: none near it is.
+    int point_beside(const Vec2& x) const {
         int nearest = -1;
         double least = INFINITY;
         body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
@@ -155,13 +156,13 @@ struct CutOut {
         : box(place), scene(scene_in(whole, line, crack, place, cell)), materials(scene), body(scene, materials),
           equilibrium(held(scene, body, place, whole.specimen.size), plan, materials, body) {}
 
-    bool solve(const View& from, int crack);
+    bool solve(const View& from);
     std::vector<Vec2> slope_by(const View& from, const std::vector<Vec2>& inner, const std::vector<MaterialSlope>& numbers,
                                std::vector<double>& by_number);
-    View view() const { return {body, equilibrium.cracks(), equilibrium.displacements(), box.low}; }
+    View view() const { return {body, equilibrium.cracks(), equilibrium.displacements(), box.low, 0}; }
 };
 
-bool CutOut::solve(const View& from, int crack) {
+bool CutOut::solve(const View& from) {
     const int fields = equilibrium.cracks().fields();
     std::vector<bool> is_held(fields, false);
     for (const Boundary::Held& h : equilibrium.boundary().held) is_held[h.field] = true;
@@ -173,7 +174,7 @@ bool CutOut::solve(const View& from, int crack) {
             if (!is_held[field]) continue;
             is_held[field] = false;  // once is enough
             // As the wood beside the node moves, on its side of the crack.
-            const int other = from.point_beside(body.points.position[p] + shift, crack);
+            const int other = from.point_beside(body.points.position[p] + shift);
             if (other < 0) return false;
             const Vec2 x = body.layout.node_position(equilibrium.cracks().node_of_field[field]) + shift;
             outline.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
@@ -239,17 +240,16 @@ MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const Di
 
     // Down: each box with cells as they are and half as wide.
     std::vector<std::unique_ptr<CutOut>> coarse, fine;
-    std::vector<View> views{{body, cracks, displacement, Vec2::Zero()}};
+    std::vector<View> views{{body, cracks, displacement, Vec2::Zero(), crack}};
     double cell = std::sqrt(body.layout.cell.prod());
     MissedEnergy missed;
     for (const double half_width : half_widths) {
         const View& from = views.back();
-        const int from_crack = views.size() == 1 ? crack : 0;
         Box box = box_around(from.body.layout, tip - from.origin, half_width);
         box = {box.low + from.origin, box.high + from.origin};
         coarse.push_back(std::make_unique<CutOut>(scene, small, line, crack, box, cell));
         fine.push_back(std::make_unique<CutOut>(scene, small, line, crack, box, 0.5 * cell));
-        if (!coarse.back()->solve(from, from_crack) || !fine.back()->solve(from, from_crack)) return {};
+        if (!coarse.back()->solve(from) || !fine.back()->solve(from)) return {};
         missed.energy += share * (fine.back()->equilibrium.potential() - coarse.back()->equilibrium.potential());
         views.push_back(fine.back()->view());
         cell *= 0.5;
