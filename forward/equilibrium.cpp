@@ -515,4 +515,15 @@ void Equilibrium::set_displacements(const std::vector<Vec2>& displacement, doubl
     find_forces();
 }
 
+bool Equilibrium::relax(const std::vector<Vec2>& displacement) {
+    displacement_ = displacement;
+    prescribed_step_.assign(equation_.size(), 0.0);
+    still_to_go_.assign(boundary_.drivers(), Vec2::Zero());
+    find_forces();
+    if (!factor_tangent(false)) return false;
+    move(tangent_step(out_of_balance()), 1.0);
+    find_forces();
+    return true;
+}
+
 } // namespace crampfit

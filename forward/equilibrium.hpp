@@ -111,6 +111,12 @@ class Equilibrium {
     void restore(const Snapshot& snapshot);
     void set_displacements(const std::vector<Vec2>& displacement, double time, const Contacts& contacts = {});
 
+    /// In a linear scene: what is held stays where `displacement` has it, all else follows. False where something is loose.
+    bool relax(const std::vector<Vec2>& displacement);
+
+    /// On the fields, those that hold them left out [N].
+    const std::vector<Vec2>& out_of_balance_forces() const { return force_; }
+
   private:
     TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
     void renumber();

@@ -300,6 +300,9 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                : may_meet              ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
                : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
                                           : "solver.extrapolate is false");
+    if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) && least_advance > 0.0)
+        choose("tips near sharp boundaries", "boxes with finer cells around them",
+               "a tip that passes into wood many times as stiff releases hardly any energy within a cell: the grid alone takes it for much");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
     if (scene.solver.shape_function == ShapeFunction::bspline2)

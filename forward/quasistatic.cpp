@@ -58,7 +58,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
                          int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_, threads) {
+      equilibrium_(scene, plan, materials, body_, threads), number_keys_(numbers) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -97,7 +97,31 @@ LoadState Quasistatic::load_state() const {
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
         for (const bool at_end : {false, true})
             state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end) : TipLoad{});
+    const double energy = missed({}).energy;
+    if (!equilibrium_.boundary().has_dead_load() && energy != 0.0) {  // force goes with energy
+        const double ratio = 1.0 + energy / state.potential;
+        state.power *= ratio;
+        for (Vec2& r : state.reactions) r *= ratio;
+    }
+    state.potential += energy;
     return state;
+}
+
+// At all tips whose next advance counts.
+MissedEnergy Quasistatic::missed(const std::vector<std::string>& number_keys) const {
+    MissedEnergy all;
+    if (plan_.remembers) return all;
+    for (const GrowingTip& tip : growing_) {
+        if (tip.ahead == 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
+        const MissedEnergy one = energy_missed_at_tip(scene_, plan_, body_, equilibrium_, tip.crack, tip.at_end, number_keys);
+        all.energy += one.energy;
+        if (one.by_number.empty()) continue;
+        all.by_number.resize(one.by_number.size());
+        all.by_displacement.resize(one.by_displacement.size(), Vec2::Zero());
+        for (std::size_t n = 0; n < one.by_number.size(); ++n) all.by_number[n] += one.by_number[n];
+        for (std::size_t f = 0; f < one.by_displacement.size(); ++f) all.by_displacement[f] += one.by_displacement[f];
+    }
+    return all;
 }
 
 // A specimen in pieces that nothing holds together carries nothing.
@@ -170,6 +194,22 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
         found[n].reactions[gauges.force] = slope.along(motions[1], n) * gauges.force_direction;
         if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
+    }
+    if (const MissedEnergy energy = missed(number_keys_); !energy.by_number.empty()) {
+        std::vector<Vec2> load = energy.by_displacement;
+        for (Vec2& f : load) f *= -1.0;
+        const Equilibrium::Motion yielding = equilibrium_.yield_to(load);
+        const double potential = equilibrium_.potential(), ratio = 1.0 + energy.energy / potential;
+        for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
+            const double more = energy.by_number[n] + slope.along(yielding, n);
+            if (!boundary.has_dead_load()) {
+                const double ratio_slope = (more - energy.energy * found[n].potential / potential) / potential;
+                found[n].power = ratio * found[n].power + ratio_slope * equilibrium_.power();
+                found[n].reactions[gauges.force] = ratio * found[n].reactions[gauges.force] +
+                    ratio_slope * equilibrium_.reactions()[gauges.force].dot(gauges.force_direction) * gauges.force_direction;
+            }
+            found[n].potential += more;
+        }
     }
     std::vector<std::vector<Vec2>> moved;
     Slopes all;

@@ -2,6 +2,7 @@
 
 #include "forward/crack_driving.hpp"
 #include "forward/equilibrium.hpp"
+#include "forward/fine_tip.hpp"
 
 #include <deque>
 #include <limits>
@@ -139,6 +140,7 @@ class Quasistatic {
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     LoadState load_state() const;
+    MissedEnergy missed(const std::vector<std::string>& number_keys) const;
     LoadState nothing(double time) const;
     double time_of(int number) const { return number * time_step_; }
 
@@ -148,6 +150,7 @@ class Quasistatic {
     const Quasistatic* leader_;
     Discretisation body_;
     Equilibrium equilibrium_;
+    std::vector<std::string> number_keys_;
     std::vector<MaterialSlope> numbers_;
     std::vector<double> shift_;                   // [numbers]; empty: none
     std::deque<Place> places_;                    // parents first

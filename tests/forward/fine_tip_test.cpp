@@ -1,0 +1,142 @@
+// Energies of a crack that crosses a sharp boundary between woods.
+#include "forward/fine_tip.hpp"
+#include "tests/forward/cracked_plates.hpp"
+
+#include "datasets/io.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::test {
+namespace {
+
+// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the left.
+Scene two_woods(double boundary, double tip, double cell) {
+    Scene scene = at_rest({4e-3, 4e-3}, cell);
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{Vec2(-1000.0 + boundary, 2e-3), 2000.0, 0.5, 0.0};
+    scene.materials["LW"] = scene.materials["EW"];
+    scene.materials["LW"].youngs_modulus = 1200e6;
+    scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, -1e-5})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 2e-3), Vec2(tip, 2e-3)};
+    crack.grows = Growth::end;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    return scene;
+}
+
+MissedEnergy missed_by(const AtRest& run, const std::vector<std::string>& keys = {}) {
+    return energy_missed_at_tip(run.scene, run.plan, run.body, run.equilibrium, 0, true, keys);
+}
+
+TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
+    // The reference is tests/forward/boundary_reference.py: finite elements of its own, good to 2e-4. The load that carries the crack
+    // across goes with the root of the least of these rates, so that 3 % are half of that in the load.
+    struct Reference { double boundary; std::array<double, 5> rate; };
+    constexpr std::array<double, 5> starts{-0.4e-3, -0.2e-3, -0.1e-3, 0.0, 0.2e-3};  // of the way over 0.2 mm, from the boundary
+    for (const auto& [boundary, exact] : {Reference{2.0e-3, {2.3332, 1.6504, 5.2023, 16.3620, 41.8034}},
+                                          Reference{2.025e-3, {2.3416, 1.6550, 5.2150, 16.4026, 41.9218}},
+                                          Reference{2.05e-3, {2.3496, 1.6593, 5.2272, 16.4426, 42.0413}}}) {
+        for (std::size_t k = 0; k < starts.size(); ++k) {
+            AtRest run(two_woods(boundary, boundary + starts[k], 0.1e-3));
+            const double before = run.equilibrium.potential(), missed_before = missed_by(run).energy;
+            run.equilibrium.grow(0, true, Vec2(boundary + starts[k] + 0.2e-3, 2e-3));
+            ASSERT_EQ(run.equilibrium.solve(1.0), Equilibrium::Outcome::solved);
+            const double released = before - run.equilibrium.potential();
+            const double grid = released / 0.2e-3 / exact[k] - 1;
+            const double error = (released + missed_before - missed_by(run).energy) / 0.2e-3 / exact[k] - 1;
+            std::printf("boundary %.2f cells off a grid line, tip from %+.1f mm on: G over 0.2 mm off by %+.1f %%, without fine boxes %+.1f %%\n",
+                        (boundary - 2e-3) / 0.1e-3, 1e3 * starts[k], 100 * error, 100 * grid);
+            EXPECT_LT(std::abs(error), 0.03) << boundary << " " << starts[k];
+        }
+    }
+}
+
+TEST(VerificationFineTip, CrackJustOffAGridLineIsTheSame) {
+    // In the boxes rows of points lie between the grid line and the crack, which the grid itself does not tell apart.
+    const AtRest on(two_woods(2.025e-3, 2.05e-3, 0.1e-3));
+    Scene scene = on.scene;
+    for (Vec2& x : scene.cracks[0].points) x.y() += 8e-6;
+    const AtRest off(scene);
+    const double energy = missed_by(on).energy, change = missed_by(off).energy / energy - 1;
+    std::printf("crack 0.08 cells off a grid line: energy missed changes by %+.1f %%\n", 100 * change);
+    ASSERT_NE(energy, 0.0);
+    EXPECT_LT(std::abs(change), 0.03);  // the crack itself has moved by a third of a fine cell
+}
+
+TEST(UnitFineTip, NothingIsMissedInOneWood) {
+    Scene scene = two_woods(2e-3, 1.5e-3, 0.1e-3);
+    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);                          // the boundary is five cells away
+    scene.cracks[0].points[1].x() = 1.9e-3;
+    EXPECT_NE(missed_by(AtRest(scene)).energy, 0.0);
+    scene.materials["LW"].youngs_modulus = 60e6;
+    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);                          // no sharp boundary
+}
+
+TEST(GradientFineTip, SlopesByModuliAgainstCentralDifferences) {
+    // With the specimen's own displacements going along. Steps of 1e-4 leave 1e-7.
+    const std::vector<std::string> keys{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu"};
+    for (const double tip : {1.93e-3, 2.08e-3}) {
+        const Scene scene = two_woods(2.025e-3, tip, 0.1e-3);
+        AtRest run(scene);
+        const MissedEnergy missed = missed_by(run, keys);
+        std::vector<MaterialSlope> numbers;
+        for (const std::string& key : keys) numbers.emplace_back(scene, key, run.body);
+        std::vector<Vec2> load = missed.by_displacement;
+        for (Vec2& f : load) f *= -1.0;
+        const Equilibrium::Motion yielding = run.equilibrium.yield_to(load);
+        const Equilibrium::Slopes slopes = run.equilibrium.slopes(numbers);
+        for (std::size_t n = 0; n < keys.size(); ++n) {
+            const double step = 1e-4 * get_number(scene, keys[n]);
+            const auto with = [&](double change) {
+                Scene other = scene;
+                set_number(other, keys[n], get_number(scene, keys[n]) + change);
+                return missed_by(AtRest(other)).energy;
+            };
+            const double difference = (with(step) - with(-step)) / (2.0 * step);
+            const double slope = missed.by_number[n] + slopes.along(yielding, static_cast<int>(n));
+            std::printf("tip %.2f mm, %s: %.6e, difference %.6e\n", 1e3 * tip, keys[n].c_str(), slope, difference);
+            EXPECT_NEAR(slope, difference, 1e-6 * std::abs(difference));
+        }
+    }
+}
+
+// Displacement at which the crack leaves earlywood, through the first latewood, and the most force.
+std::pair<double, double> crossing(double cell, bool extrapolate) {
+    Scene scene = at_equilibrium(ring_specimen(2.5e-3, cell));
+    scene.solver.extrapolate = extrapolate;
+    for (auto& [name, wood] : scene.materials) wood.toughness = 10.0;
+    scene.cracks[0].grows = Growth::end;
+    scene.cracks[0].advance = 0.2e-3;
+    scene.cracks[0].direction = GrowthDirection::straight;
+    scene.stop.crack_length = 5e-3;
+    scene.stop.time.reset();
+    const Record record = simulate(scene);
+    double most = 0.0;
+    for (std::size_t k = 0; k + 1 < record.series.size(); ++k) {
+        most = std::max(most, record.series[k].force);
+        if (record.series[k + 1].crack_length - record.series[k].crack_length > 0.4e-3) return {record.series[k].displacement, most};
+    }
+    ADD_FAILURE() << "no jump across latewood";
+    return {0.0, 0.0};
+}
+
+TEST(SlowVerificationFineTip, LoadThatCarriesACrackIntoLatewoodConverges) {
+    for (const bool extrapolate : {false, true}) {
+        std::vector<std::pair<double, double>> found;
+        for (const double cell : {0.2e-3, 0.1e-3, 0.05e-3}) {
+            found.push_back(crossing(cell, extrapolate));
+            std::printf("sharp rings, %s, %.2f mm cells: crosses at %.5f mm, peak %.2f N\n", extrapolate ? "two grids" : "one grid", 1e3 * cell,
+                        1e3 * found.back().first, found.back().second);
+        }
+        EXPECT_NEAR(found[1].first, found[2].first, 0.02 * found[2].first);
+        EXPECT_NEAR(found[1].second, found[2].second, 0.02 * found[2].second);
+        EXPECT_NEAR(found[0].first, found[2].first, 0.05 * found[2].first);
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::test
