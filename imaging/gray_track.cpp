@@ -168,6 +168,8 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
         return found;
     if (!way->ends_inside) {
         found.status = TipStatus::outside;
+        for (const cv::Point2d& point : way->points)
+            found.way.emplace_back(point.x, point.y);
         return found;
     }
     // The wood about the tip moves by itself: once more, lined up there.
