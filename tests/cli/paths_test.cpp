@@ -1,4 +1,5 @@
 // The direction criterion from pictures of bare wood: simulate, photograph, track, fit each criterion, look at the paths.
+#include "datasets/io.hpp"
 #include "tests/cli/command.hpp"
 
 #include <fmt/format.h>
@@ -71,9 +72,9 @@ title = "Which way does the crack turn?"
 [[experiments]]
 name = "block"
 scene = "scene.toml"
-data = "experiment.csv"
+data = "curves.csv"
 noise = { force = "1 N" }
-photograph = { picture = "pictures/image_0003.png", track = "track.h5", offset = ["-0.2 mm", "-0.2 mm"] }
+photograph = { picture = "pictures/image_0003.png", track = "track.h5" }
 
 [[parameters]]
 name = "EW toughness"
@@ -114,16 +115,20 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
         return outcome;
     };
     done({"simulate", command.path("truth.toml"), "-o", command.path("truth.h5")});
-    done({"camera", command.path("truth.h5"), "-o", command.path("pictures"), "--pixel", "20 um", "--margin", "0.2 mm", "--wood", SAMPLES "/rings.png",
+    done({"camera", command.path("truth.h5"), "-o", command.path("pictures"), "--pixel", "20 um", "--wood", SAMPLES "/rings.png",
           "--noise", "2"});
     std::vector<std::string> words{"track", command.path("pictures/reference.png")};
     for (int i = 0; i < frames; ++i)
         words.push_back(command.path(fmt::format("pictures/image_{:04}.png", i)));
-    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--from", "gray", "--times", command.path("pictures/load.csv"), "--load",
-                               command.path("pictures/load.csv"), "--preview", command.path("track.png")});
+    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--from", "gray", "--preview", command.path("track.png")});
     done(words);
     EXPECT_GT(done({"csv", command.path("track.h5"), "ways"}).out.size(), 1000u);
-    command.folder.write("experiment.csv", done({"csv", command.path("track.h5"), "experiment"}).out);
+    Curves curves;
+    for (const Instant& instant : read_record(command.path("truth.h5")).series) {
+        curves.displacement.push_back(instant.displacement);
+        curves.force.push_back(instant.force);
+    }
+    write_curves(curves, command.path("curves.csv"));
     command.folder.write("study.toml", study);
     const Outcome fitted = done({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
     EXPECT_TRUE(contains(fitted.out, "path off by")) << fitted.out;
@@ -134,9 +139,9 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
         std::printf("%s: mean %.3f, largest %.3f mm over %.2f mm\n", model.c_str(), 1e3 * distance[0], 1e3 * distance[1], 1e3 * distance[2]);
     std::fflush(stdout);
     // The right model has the path but for what the pictures say of it: a few pixels of 20 um.
-    EXPECT_LT(distances["normal to opening"][0], 0.1e-3);
+    EXPECT_LT(distances["normal to opening"][0], 0.06e-3);
     EXPECT_LT(distances["normal to opening"][0], 0.5 * distances["straight"][0]);
-    EXPECT_GT(distances["normal to opening"][2], 1e-3);
+    EXPECT_NEAR(distances["normal to opening"][2], 5e-3, 0.2e-3);  // from the notch's tip to the side, over which they have both grown
 
     done({"report", command.path("fit.h5"), "-o", command.path("fit.html")});
     const std::string page = command.folder.read("fit.html");
@@ -147,7 +152,7 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
 TEST(SystemPaths, PicturesThatDoNotFitAreRefusedBeforeAnythingRuns) {
     Command command;
     command.folder.write("scene.toml", scene("straight"));
-    command.folder.write("experiment.csv", "displacement [mm],force [N]\n0,0\n0.1,1\n");
+    command.folder.write("curves.csv", "displacement [mm],force [N]\n0,0\n0.1,1\n");
     command.folder.write("text.png", "no picture");
     const auto refused = [&](const std::string& photograph, const std::string& phrase) {
         std::string text = study;
