@@ -35,8 +35,7 @@ Fit run(const Study& study, const StudyArguments& arguments, const CommonOptions
                   fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs, most, progress.best_misfit));
     };
     Fit fit = fit_models(study, options);
-    if (fit.status != FitStatus::failed)
-        fit.crack_paths = crack_paths(study, fit, common.threads, &stop_requested());
+    fit.crack_paths = crack_paths(study, fit, common.threads, &stop_requested());
     return fit;
 }
 

@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::size_t most_picture_bytes = 2'000'000;  // of all figures together: the page stays below 5 MB
 constexpr int picture_pixels = 900;                    // along the longer side
-constexpr double around = 0.08;                        // of a close-up, on each side
+constexpr double around = 0.08;                        // of a close-up, on each side, of its longer side
+constexpr double least_aspect = 0.5;                   // of a close-up, shorter to longer side
 
 /// What a figure shows of one experiment.
 struct Sight {
@@ -46,7 +47,8 @@ std::pair<Vec2, Vec2> corners_about(const CrackPaths& paths, const std::vector<s
     include(paths.photographed);
     for (const std::size_t model : models)
         std::ranges::for_each(paths.simulated[model].cracks, include);
-    const Vec2 margin = Vec2::Constant(around * (high - low).maxCoeff());
+    const double longer = (high - low).maxCoeff();
+    const Vec2 margin = (0.5 * (Vec2::Constant(least_aspect * longer) - (high - low))).cwiseMax(around * longer);
     return {(low - margin).cwiseMax(paths.picture.low), (high + margin).cwiseMin(paths.picture.high)};
 }
 
@@ -90,16 +92,16 @@ std::string figure(const Sight& sight, const std::vector<std::uint8_t>& png) {
     const CrackPaths& paths = *sight.paths;
     Chart chart = plane_chart(sight.title);
     chart.pictures.push_back(picture_between(sight.low, sight.high, png));
-    if (!paths.photographed.empty()) {
-        chart.series.push_back(path_line(paths.photographed, colour::black));
-        chart.series.back().label = "photographed";
-        chart.series.back().kind = ChartSeries::Kind::dashed;
-    }
     for (const std::size_t model : sight.models)
         for (std::size_t crack = 0; crack < paths.simulated[model].cracks.size(); ++crack) {
             chart.series.push_back(path_line(paths.simulated[model].cracks[crack], colour_of(model)));
             chart.series.back().label = crack == 0 ? label_of(paths.simulated[model]) : "";
         }
+    if (!paths.photographed.empty()) {  // last: through its gaps one sees what it lies on
+        chart.series.push_back(path_line(paths.photographed, colour::black));
+        chart.series.back().label = "photographed";
+        chart.series.back().kind = ChartSeries::Kind::dashed;
+    }
     return draw(chart);
 }
 
@@ -135,16 +137,18 @@ std::string millimetres(double metres) { return std::isfinite(metres) ? fmt::for
 
 std::string paths_section(const Fit& fit) {
     std::vector<Sight> sights;
-    bool photographed = false;
+    bool tracked = false, on_photograph = false;
     for (const CrackPaths& paths : fit.crack_paths)
         if (any_path(paths)) {
             std::ranges::move(sights_of(paths), std::back_inserter(sights));
-            photographed = photographed || !paths.photographed.empty();
+            tracked = tracked || !paths.photographed.empty();
+            on_photograph = on_photograph || paths.on_photograph;
         }
     if (sights.empty())
         return {};
-    return section("Crack paths", paragraph("At the best parameters, in the undeformed specimen.") +
-                                      (photographed ? distances_table(fit.crack_paths) : "") + figures(draw_sights(std::move(sights))));
+    const std::string where = on_photograph ? " A photograph under load shows a gap beside the place where the wood parted." : "";
+    return section("Crack paths", paragraph("At the best parameters, in the undeformed specimen." + where) +
+                                      (tracked ? distances_table(fit.crack_paths) : "") + figures(draw_sights(std::move(sights))));
 }
 
 }  // namespace crampfit::cli

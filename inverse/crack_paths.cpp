@@ -155,12 +155,19 @@ void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std:
 }
 
 std::vector<CrackPaths> crack_paths(const Study& study, const Fit& fit, int threads, const std::atomic<bool>* stop) {
-    const Forward forward = [](const Scene& scene, const std::atomic<bool>* stop_run) {
+    const bool photographed = std::ranges::any_of(study.experiments, [](const Experiment& experiment) { return experiment.photograph.has_value(); });
+    if (study.models.empty() && !photographed) {
+        return {};
+    }
+    const std::vector<FittedModel> models = models_of(study, fit);
+    const int jobs = static_cast<int>(study.experiments.size() * models.size());
+    const int threads_a_run = std::max(1, thread_count(threads) / jobs);
+    const Forward forward = [threads_a_run](const Scene& scene, const std::atomic<bool>* stop_run) {
         SimulateOptions options;
         options.stop_requested = stop_run;
+        options.threads = threads_a_run;
         return simulate(scene, options);
     };
-    const std::vector<FittedModel> models = models_of(study, fit);
     std::vector<SceneRuns> runs;
     for (const FittedModel& model : models) {
         runs.emplace_back(model.study, forward, stop);
@@ -174,7 +181,7 @@ std::vector<CrackPaths> crack_paths(const Study& study, const Fit& fit, int thre
         all[i].photographed = experiment.photograph ? experiment.photograph->path : std::vector<Vec2>();
         all[i].simulated.resize(models.size());
     }
-    parallel_for(static_cast<int>(all.size() * models.size()), thread_count(threads), [&](int job) {
+    parallel_for(jobs, thread_count(threads), [&](int job) {
         const std::size_t i = static_cast<std::size_t>(job) / models.size(), k = static_cast<std::size_t>(job) % models.size();
         SimulatedPath& simulated = all[i].simulated[k];
         simulated.model = models[k].name;

@@ -203,9 +203,7 @@ Fit run_fit(const Path& file, const py::dict& settings, int threads, const std::
     return interruptible([&](const std::atomic<bool>* stop) {
         options.stop_requested = stop;
         Fit fit = fit_models(study, options);
-        if (fit.status != FitStatus::failed) {
-            fit.crack_paths = crack_paths(study, fit, threads, stop);
-        }
+        fit.crack_paths = crack_paths(study, fit, threads, stop);
         return fit;
     });
 }

@@ -42,12 +42,11 @@ Vec2 middle_of_mark(const PlanePicture& picture) {
 TEST(UnitPhotograph, LiesWhereItsPlacementSays) {
     const TemporaryFolder folder;
     write_gray(marked(400, 300, 250, 120), folder / "photograph.png");
-    for (const double pixel : {20e-6, 5e-6})  // as it is; shrunk
+    for (const double pixel : {20e-6, 5e-6})  // as it is; shrunk, since 1600 pixels are kept of 21 mm
         for (const double rotation : {0.0, 0.3, 1.5707963267948966}) {
-            Photograph photograph{.file = folder / "photograph.png", .placement = {pixel, {1e-3, -0.5e-3}, rotation, 0}, .path = {}, .picture = {}};
-            const Vec2 mark = Placement{pixel, {1e-3, -0.5e-3}, rotation, 300}.place(249.5, 119.5);
-            const double big = pixel < 10e-6 ? 2e-2 : 8e-3;  // so that the finer photograph is shrunk
-            const Vec2 size(big, big);
+            const Vec2 size(20e-3, 15e-3), offset(9e-3, 7e-3);
+            Photograph photograph{.file = folder / "photograph.png", .placement = {pixel, offset, rotation, 0}, .path = {}, .picture = {}};
+            const Vec2 mark = Placement{pixel, offset, rotation, 300}.place(249.5, 119.5);
             load_photograph(photograph, size, {"study.toml", "picture"});
             const PlanePicture& picture = photograph.picture;
             EXPECT_LE(std::max(picture.columns, picture.rows), 1601);
