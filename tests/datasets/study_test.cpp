@@ -189,6 +189,7 @@ TEST(UnitStudy, PhotographOfACrack) {
     track.pixel = 50e-6;
     track.columns = 400;
     track.rows = 200;
+    track.images = {"last.png"};
     track.tips = {{.status = TipStatus::ok, .tip = {149.5, 99.5}, .way = {{-0.5, 99.5}, {149.5, 99.5}}}};
     write(track, folder / "track.h5");
     folder.write("last.png", "");  // read later
