@@ -297,13 +297,14 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     const std::optional<DarkWay> way = line_in(contrast, before);
     if (!way)
         return std::nullopt;
-    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well: only what is
-    // darker than all that may have moved there is the crack.
+    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well. Where the
+    // specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the crack.
     const int opened = static_cast<int>(std::ceil(*std::ranges::max_element(way->half_width)));
-    if (opened <= tolerance && contrast.is_crack())
+    const bool apart = opened > tolerance && !way->ends_inside;
+    if (!apart && contrast.is_crack())
         return way;
     const Contrast farther = compare(before, now, inner, least, tolerance + opened);
-    if (opened > tolerance && farther.is_crack())
+    if (apart && farther.is_crack())
         if (const std::optional<DarkWay> clear = line_in(farther, before))
             return clear;
     return contrast.is_crack() || farther.is_crack() ? way : std::nullopt;
