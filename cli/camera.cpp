@@ -161,14 +161,15 @@ Verb camera_verb(CLI::App& command, const CommonOptions& common) {
         ->required();
     verb->add_option("--pixel", arguments->pixel, "Edge of a pixel on the specimen, as in \"20 um\"")->type_name("LENGTH")->required();
     verb->add_option("--margin", arguments->margin, "Of background around the specimen")->type_name("LENGTH")->capture_default_str();
-    verb->add_option("--wood", arguments->wood, "A picture of the specimen, which is then seen as it is, without a speckle pattern on it")
-        ->type_name("PICTURE");
+    CLI::Option* wood = verb->add_option("--wood", arguments->wood, "A picture of the specimen, which is then seen as it is, without a speckle pattern on it")
+                            ->type_name("PICTURE");
     verb->add_option("--wood-pixel", arguments->wood_pixel, "Edge of that picture's pixel on the specimen; else as the scene has it")
-        ->type_name("LENGTH");
+        ->type_name("LENGTH")
+        ->needs(wood);
     verb->add_option("--blur", arguments->blur, "Of the lens, one standard deviation in pixels; 0.7 with --wood, else in --spot")->type_name("PIXELS");
     verb->add_option("--noise", options.noise, "Standard deviation of each pixel's gray, of 255")->capture_default_str();
-    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str();
-    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str();
+    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str()->excludes(wood);
+    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str()->excludes(wood);
     verb->add_option("--seed", options.seed, "Of the pattern and the noise")->capture_default_str();
     return {verb, [arguments, &common] { return photograph(*arguments, common); }};
 }

@@ -149,6 +149,29 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
         EXPECT_TRUE(contains(page, part)) << part;
 }
 
+TEST(SystemPaths, WoodThatTheCameraCannotSeeIsRefused) {
+    Command command;
+    std::string coarse = scene("straight");
+    coarse.replace(coarse.find("cell = \"0.2 mm\""), 15, "cell = \"0.5 mm\"");
+    command.folder.write("scene.toml", coarse);
+    ASSERT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5")}).status, 0);
+    const auto refused = [&](const std::vector<std::string>& more, const std::string& phrase) {
+        std::vector<std::string> words{"camera", command.path("record.h5"), "-o", command.path("pictures"), "--pixel", "50 um"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << phrase;
+        EXPECT_TRUE(contains(outcome.error, phrase)) << outcome.error;
+    };
+    const std::string rings = SAMPLES "/rings.png";
+    refused({"--wood", "none.png"}, "--wood");
+    refused({"--wood-pixel", "25 um"}, "--wood");
+    refused({"--wood", rings, "--spot", "2"}, "--spot");
+    refused({"--wood", rings, "--wood-pixel", "20 um"}, "must show the whole specimen");
+    refused({"--wood", rings, "--wood-pixel", "20"}, "--wood-pixel");
+    refused({"--wood", rings, "--blur", "-1"}, "blur");
+    EXPECT_FALSE(std::filesystem::exists(command.path("pictures")));
+}
+
 TEST(SystemPaths, PicturesThatDoNotFitAreRefusedBeforeAnythingRuns) {
     Command command;
     command.folder.write("scene.toml", scene("straight"));
