@@ -4,8 +4,10 @@
 #include "datasets/error.hpp"
 #include "datasets/limits.hpp"
 #include "datasets/record_file.hpp"
+#include "datasets/toml_reader.hpp"
 #include "datasets/whole_file.hpp"
 #include "imaging/record_camera.hpp"
+#include "imaging/wood_surface.hpp"
 #include "inverse/pool.hpp"
 
 #include <fmt/format.h>
@@ -23,14 +25,57 @@ namespace {
 struct Arguments {
     std::filesystem::path record, folder;
     std::string pixel, margin = "0 mm";
+    std::filesystem::path wood;  // empty: a speckle pattern
+    std::string wood_pixel;      // as written; empty: as the scene has it
+    std::optional<double> blur;  // [px]
     VirtualCameraOptions options{.columns = 1, .rows = 1};
 };
+
+// Of plain wood narrow gaps are seen by what they darken, through a lens.
+constexpr int wood_samples = 3;
+constexpr double wood_blur = 0.7;  // [px]
 
 double length_of(const std::string& text, const NumberRule& rule, const char* option) {
     const double value = parse_quantity(text, rule.dimension, {"command line", option});
     if (!rule.allows(value))
         throw InputError("command line", option, text, rule.rule);
     return value;
+}
+
+/// How the wood's picture lies on the specimen: as the record's scene has it, where it is made from a picture.
+Placement placement_of_wood(const Arguments& arguments, const Record& record) {
+    const Document scene(record.scene_text, arguments.record, {});
+    const Entry specimen = scene.root().at("specimen");
+    Placement placement;
+    if (!arguments.wood_pixel.empty())
+        placement.pixel = length_of(arguments.wood_pixel, limits::pixel, "--wood-pixel");
+    else if (const auto pixel = specimen.find("pixel"))
+        placement.pixel = pixel->number(limits::pixel);
+    else
+        throw InputError("command line", "--wood-pixel", "absent", "must be given: the record's scene does not say how large a pixel of the picture is");
+    if (const auto offset = specimen.find("offset"))
+        placement.offset = offset->point();
+    if (const auto rotation = specimen.find("rotation"))
+        placement.rotation = rotation->number(limits::rotation);
+    return placement;
+}
+
+/// The gray of the wood that the scene's specimen was made from.
+std::function<double(const Vec2&)> wood_of(const Arguments& arguments, const Record& record, double pixel) {
+    if (arguments.wood.empty())
+        return {};
+    Placement placement = placement_of_wood(arguments, record);
+    const FinePicture picture = read_fine_gray(arguments.wood, {"command line", "--wood"});
+    placement.rows = picture.rows;
+    Vec2 size = Vec2::Zero();
+    for (const Vec2& place : record.point_position)
+        size = size.cwiseMax(place);
+    if (!covers(picture, placement, size))
+        throw InputError("command line", "--wood", arguments.wood.string(),
+                         fmt::format("must show the whole specimen, {:.3g} x {:.3g} mm; it is {:.3g} x {:.3g} mm, its lower left corner at {:.3g}, {:.3g} mm",
+                                     1e3 * size.x(), 1e3 * size.y(), 1e3 * placement.pixel * picture.columns, 1e3 * placement.pixel * picture.rows,
+                                     1e3 * placement.offset.x(), 1e3 * placement.offset.y()));
+    return wood_surface(picture, placement, pixel);
 }
 
 /// The row of the series at a frame's time.
@@ -74,9 +119,12 @@ ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
     const double pixel = length_of(arguments.pixel, limits::pixel, "--pixel");
     const double margin = length_of(arguments.margin, limits::not_negative(dimension::length), "--margin");
-    arguments.options.validate();
+    VirtualCameraOptions options = arguments.options;
+    options.samples = arguments.wood.empty() ? 1 : wood_samples;
+    options.blur = arguments.blur.value_or(arguments.wood.empty() ? 0 : wood_blur);
+    options.validate();
     const Record record = read_record(arguments.record);
-    const RecordCamera camera(record, arguments.record, pixel, margin, arguments.options);
+    const RecordCamera camera(record, arguments.record, pixel, margin, options, wood_of(arguments, record, pixel));
     const std::filesystem::path folder = make_folder(arguments.folder);
     write_gray(camera.reference(), folder / "reference.png");
     write_curves(load_of(record), folder / "load.csv");
@@ -113,9 +161,15 @@ Verb camera_verb(CLI::App& command, const CommonOptions& common) {
         ->required();
     verb->add_option("--pixel", arguments->pixel, "Edge of a pixel on the specimen, as in \"20 um\"")->type_name("LENGTH")->required();
     verb->add_option("--margin", arguments->margin, "Of background around the specimen")->type_name("LENGTH")->capture_default_str();
+    CLI::Option* wood = verb->add_option("--wood", arguments->wood, "A picture of the specimen, which is then seen as it is, without a speckle pattern on it")
+                            ->type_name("PICTURE");
+    verb->add_option("--wood-pixel", arguments->wood_pixel, "Edge of that picture's pixel on the specimen; else as the scene has it")
+        ->type_name("LENGTH")
+        ->needs(wood);
+    verb->add_option("--blur", arguments->blur, "Of the lens, one standard deviation in pixels; 0.7 with --wood, else in --spot")->type_name("PIXELS");
     verb->add_option("--noise", options.noise, "Standard deviation of each pixel's gray, of 255")->capture_default_str();
-    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str();
-    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str();
+    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str()->excludes(wood);
+    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str()->excludes(wood);
     verb->add_option("--seed", options.seed, "Of the pattern and the noise")->capture_default_str();
     return {verb, [arguments, &common] { return photograph(*arguments, common); }};
 }

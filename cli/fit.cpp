@@ -1,6 +1,7 @@
 #include "cli/study_verb.hpp"
 #include "cli/verbs.hpp"
 #include "inverse/compare.hpp"
+#include "inverse/crack_paths.hpp"
 
 #include <fmt/format.h>
 
@@ -33,7 +34,9 @@ Fit run(const Study& study, const StudyArguments& arguments, const CommonOptions
         line.show(progress.runs, progress.max_runs, progress.failure,
                   fmt::format("{}: {} runs{}, best misfit {:.4g}", progress.stage, progress.runs, most, progress.best_misfit));
     };
-    return fit_models(study, options);
+    Fit fit = fit_models(study, options);
+    fit.crack_paths = crack_paths(study, fit, common.threads, &stop_requested());
+    return fit;
 }
 
 /// What the other ranks do for the one that leads.
@@ -58,9 +61,14 @@ std::string table_text(const Fit& fit) {
                             parameter.standard_error,
                             fmt::format("{:.4g} .. {:.4g}", parameter.lower_95, parameter.upper_95), parameter.unit,
                             parameter.at_bound ? "  (at a bound)" : "");
-    for (const ComparedModel& model : fit.models)
-        text += fmt::format("{:<24}  misfit {:>9.4g}  AIC {:>9.4g}  BIC {:>9.4g}  weight {:.3g}\n", model.name, model.misfit, model.aic,
-                            model.bic, model.weight);
+    for (const ComparedModel& model : fit.models) {
+        const SimulatedPath path = together(fit, model.name);
+        const std::string off = path.compared_length > 0 ? fmt::format("  path off by {:.3g} mm on average, {:.3g} mm at most", 1e3 * path.mean_distance,
+                                                                       1e3 * path.largest_distance)
+                                                         : "";
+        text += fmt::format("{:<24}  misfit {:>9.4g}  AIC {:>9.4g}  BIC {:>9.4g}  weight {:.3g}{}\n", model.name, model.misfit, model.aic,
+                            model.bic, model.weight, off);
+    }
     return text;
 }
 

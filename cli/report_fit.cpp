@@ -149,13 +149,22 @@ std::string distances_section(const Fit& fit) {
 std::string models_section(const Fit& fit) {
     if (fit.models.empty())
         return {};
+    std::vector<std::string> heads{"Model", "Ended", "Misfit", "AIC", "BIC", "Weight"};
+    const bool photographed = std::ranges::any_of(fit.crack_paths, [](const CrackPaths& paths) { return !paths.photographed.empty(); });
+    if (photographed)
+        heads.insert(heads.end(), {"Path off by, mean [mm]", "At most [mm]"});
     std::vector<std::vector<std::string>> rows;
-    for (const ComparedModel& model : fit.models)
+    for (const ComparedModel& model : fit.models) {
         rows.push_back({model.name, model.status, fmt::format("{:.4g}", model.misfit), fmt::format("{:.4g}", model.aic),
                         fmt::format("{:.4g}", model.bic), fmt::format("{:.3g}", model.weight)});
+        const SimulatedPath all = together(fit, model.name);
+        if (photographed)
+            rows.back().insert(rows.back().end(), {millimetres(all.mean_distance), millimetres(all.largest_distance)});
+    }
     return section("Which model the data speak for",
-                   table("The best one first; all else on this page is of that one. Akaike weights share out the evidence.",
-                         {"Model", "Ended", "Misfit", "AIC", "BIC", "Weight"}, rows));
+                   table("The best one first; parameters, curves and intervals on this page are its. Akaike weights share out the evidence of "
+                         "the data; photographed paths are no part of it.",
+                         heads, rows));
 }
 
 // ---- parameters
@@ -333,7 +342,7 @@ std::string summary(const Fit& fit) {
 
 std::string fit_page(const Fit& fit, const Origin& origin) {
     const std::string title = title_of(fit.study_text, origin);
-    return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) +
+    return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) + paths_section(fit) +
                            comparisons_section(fit) + checks_section(fit) + distances_section(fit) + correlation_section(fit) + profiles_section(fit) + posterior_section(fit) +
                            runs_section(fit) + repeat_section(fit.study_text, "fit", "study.toml", origin));
 }

@@ -23,6 +23,12 @@ std::string sensitivity_page(const Sensitivity& sensitivity, const Origin& origi
 /// frames shown are those of `shown_frames`.
 std::string specimen_section(const Record& record);
 
+/// Simulated crack paths of each experiment over the photographed one, or over the model's wood; empty where the fit has none.
+std::string paths_section(const Fit& fit);
+
+/// A length [m] for a table; a dash for what is no number.
+std::string millimetres(double metres);
+
 /// Numbers of the frames that a page shows: all, or a few dozen evenly spread from the first to the last.
 std::vector<std::size_t> shown_frames(const Record& record);
 

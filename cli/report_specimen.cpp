@@ -1,5 +1,5 @@
-#include "cli/chart.hpp"
 #include "cli/html.hpp"
+#include "cli/plane_figure.hpp"
 #include "cli/report_pages.hpp"
 
 #include <opencv2/imgcodecs.hpp>
@@ -135,28 +135,8 @@ std::string colour_bar(const std::string& text, const std::string& low, const st
 
 // ---- the undeformed specimen
 
-std::vector<double> millimetres(const std::vector<Vec2>& vertices, int axis) {
-    std::vector<double> values;
-    for (const Vec2& vertex : vertices)
-        values.push_back(1e3 * vertex[axis]);
-    return values;
-}
-
-ChartSeries path_line(const std::vector<Vec2>& path, const char* ink, int frame = always) {
-    return {.colour = ink, .x = millimetres(path, 0), .y = millimetres(path, 1), .frame = frame};
-}
-
 ChartPicture picture_over(const View& view, const std::vector<std::uint8_t>& bytes, int frame = always) {
-    return {.address = png_address(bytes),
-            .left = 1e3 * view.low.x(),
-            .right = 1e3 * view.high.x(),
-            .bottom = 1e3 * view.low.y(),
-            .top = 1e3 * view.high.y(),
-            .frame = frame};
-}
-
-Chart plane_chart(const std::string& title) {
-    return {.title = title, .x_label = "x [mm]", .y_label = "y [mm]", .equal_scales = true};
+    return picture_between(view.low, view.high, bytes, frame);
 }
 
 /// The first crack grows with the slider: its vertices are what frames hold. Others stand as they ended.

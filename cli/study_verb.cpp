@@ -1,6 +1,6 @@
 #include "cli/study_verb.hpp"
 
-#include "imaging/picture.hpp"
+#include "imaging/photograph.hpp"
 
 #include <spdlog/spdlog.h>
 
@@ -16,13 +16,7 @@ void add_study_arguments(CLI::App& verb, StudyArguments& arguments, const char* 
 
 Study open_study(const std::filesystem::path& file, const CommonOptions& common) {
     Study study = read_study(file, overrides_of(common));
-    if (study.scene)
-        load_specimen(*study.scene);
-    for (Experiment& experiment : study.experiments)
-        load_specimen(experiment.scene);
-    for (ModelChoice& model : study.models)
-        for (Scene& scene : model.scenes)
-            load_specimen(scene);
+    load_pictures(study);
     stop_on_signals();
     spdlog::info("the study is read");
     return study;

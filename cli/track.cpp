@@ -48,6 +48,7 @@ class TipFinder {
     }
 
     int from_gray() const { return from_gray_; }
+    const FieldGeometry& geometry() const { return geometry_; }
 
   private:
     Correlator correlator_;
@@ -83,6 +84,8 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
     check_series(pictures, common);
     CrackTrack track = start_track(arguments, common);
     TipFinder find_tip(pictures, arguments.from, common);
+    track.columns = find_tip.geometry().columns;
+    track.rows = find_tip.geometry().rows;
 
     stop_on_signals();
     ProgressLine line(common, "images");

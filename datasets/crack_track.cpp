@@ -42,6 +42,30 @@ const LoadColumn load_columns[] = {
     {"force", {"N", "of the loading at each image's time"}, &CrackTrack::force},
 };
 
+/// All ways in one array: that of an image ends where `way ends` says, and begins where the one before ends.
+void write_ways(Group& root, const std::vector<CrackTip>& tips) {
+    std::vector<Vec2> points;
+    std::vector<std::int64_t> ends;
+    for (const CrackTip& tip : tips) {
+        points.insert(points.end(), tip.way.begin(), tip.way.end());
+        ends.push_back(static_cast<std::int64_t>(points.size()));
+    }
+    root.write("way points", points, {"px", "of the cracks' ways from mouth to tip, where they were followed, one image after the other"});
+    root.write("way ends", ends, {"1", "row of `way points` before which each image's way ends"});
+}
+
+void read_ways(const Group& root, std::vector<CrackTip>& tips) {
+    const std::vector<Vec2> points = root.read_rows<double, 2>("way points");
+    std::int64_t first = 0;
+    const std::vector<std::int64_t> ends = root.read_column<std::int64_t>("way ends", tips.size());
+    for (std::size_t i = 0; i < tips.size(); ++i) {
+        if (ends[i] < first || ends[i] > static_cast<std::int64_t>(points.size()))
+            root.refuse("way ends", std::to_string(ends[i]), fmt::format("must rise, to {} at most", points.size()));
+        tips[i].way.assign(points.begin() + first, points.begin() + ends[i]);
+        first = ends[i];
+    }
+}
+
 }  // namespace
 
 const char* name(TipStatus status) { return status_names.at(static_cast<std::size_t>(status)); }
@@ -57,6 +81,21 @@ Curves curves_of(const CrackTrack& track) {
     return curves;
 }
 
+std::vector<Vec2> path_of(const CrackTrack& track) {
+    for (auto tip = track.tips.rbegin(); tip != track.tips.rend(); ++tip)
+        if (!tip->way.empty())
+            return tip->way;
+    std::vector<Vec2> path;
+    for (const CrackTip& tip : track.tips) {
+        if (tip.status != TipStatus::ok)
+            continue;
+        if (path.empty())
+            path.push_back(tip.tip - tip.length * Vec2(std::cos(tip.angle), std::sin(tip.angle)));
+        path.push_back(tip.tip);
+    }
+    return path;
+}
+
 void write(const CrackTrack& track, const std::filesystem::path& file) {
     hdf5::save(file, "track", [&](Group& root) {
         root.write_text("reference", track.reference, "picture that all others are compared with");
@@ -64,6 +103,10 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
         if (track.pixel)
             root.write("pixel", *track.pixel, {"m", "edge of a pixel"});
         root.write_texts("status names", {status_names.begin(), status_names.end()}, "whether a tip was found");
+        if (track.rows > 0) {
+            root.write<std::int64_t>("columns", track.columns, {"px", "width of the pictures"});
+            root.write<std::int64_t>("rows", track.rows, {"px", "height of the pictures"});
+        }
         std::vector<std::uint8_t> status;
         std::vector<Vec2> tips;
         for (const CrackTip& tip : track.tips) {
@@ -80,6 +123,7 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
                 values.push_back(tip.*column.value);
             root.write(column.name, values, column.meaning);
         }
+        write_ways(root, track.tips);
         if (track.clock) {
             Group clock = root.make_group("clock", "load time = offset + rate * image time");
             clock.write("offset", track.clock->offset, {"s", "of the images' time 0 on the load's clock"});
@@ -101,6 +145,10 @@ CrackTrack read_crack_track(const std::filesystem::path& file) {
     track.images = root.read_texts("image files");
     if (root.has("pixel"))
         track.pixel = root.read_number<double>("pixel");
+    if (root.has("rows")) {
+        track.columns = static_cast<int>(root.read_number<std::int64_t>("columns"));
+        track.rows = static_cast<int>(root.read_number<std::int64_t>("rows"));
+    }
     const std::size_t count = track.images.size();
     const std::vector<Vec2> tips = root.read_rows<double, 2>("tip", count);
     const std::vector<std::uint8_t> status = root.read_column<std::uint8_t>("status", count);
@@ -116,6 +164,8 @@ CrackTrack read_crack_track(const std::filesystem::path& file) {
         for (std::size_t i = 0; i < count; ++i)
             track.tips[i].*column.value = values[i];
     }
+    if (root.has("way ends"))
+        read_ways(root, track.tips);
     if (root.has("clock")) {
         const Group clock = root.group("clock");
         track.clock = ClockSetting{clock.read_number<double>("offset"), clock.read_number<double>("rate"), clock.read_text("reason"), {}};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "datasets/crack_paths.hpp"
 #include "datasets/scene.hpp"
 
 #include <optional>
@@ -53,6 +54,7 @@ struct Experiment {
     Scene scene;
     Curves data;                           // none of its columns, where fields are all there is
     std::optional<MeasuredFields> fields = {};
+    std::optional<Photograph> photograph = {};  // to look at: no fit rests on it
     Noise noise;
     Machine machine;
     double weight = 1.0;

@@ -1,5 +1,6 @@
 #include "datasets/fit.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace crampfit {
@@ -16,6 +17,23 @@ const char* name(FitStatus status) {
         return "failed";
     }
     throw std::logic_error("a fit status without a name");
+}
+
+SimulatedPath together(const Fit& fit, const std::string& model) {
+    SimulatedPath all{.model = model, .status = "", .cracks = {}};
+    double sum = 0, largest = 0;
+    for (const CrackPaths& paths : fit.crack_paths)
+        for (const SimulatedPath& one : paths.simulated)
+            if (one.model == model && one.compared_length > 0) {
+                sum += one.compared_length * one.mean_distance;
+                largest = std::max(largest, one.largest_distance);
+                all.compared_length += one.compared_length;
+            }
+    if (all.compared_length > 0) {
+        all.mean_distance = sum / all.compared_length;
+        all.largest_distance = largest;
+    }
+    return all;
 }
 
 }  // namespace crampfit

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "datasets/crack_paths.hpp"
+
 #include <Eigen/Core>
 
 #include <string>
@@ -106,6 +108,7 @@ struct Fit {
     std::vector<FitCheck> checks;        // of each curve
     std::vector<CurveDistance> distances;  // of each curve
     std::vector<ComparedModel> models;   // best first; empty where none were compared
+    std::vector<CrackPaths> crack_paths; // of each experiment; empty where they were not asked for
     std::vector<ProfilePoint> profile;   // of each parameter, if asked for
     std::vector<PosteriorSample> posterior;
     std::vector<FitRun> runs;
@@ -113,5 +116,8 @@ struct Fit {
     unsigned seed = 0;
     std::string study_text;
 };
+
+/// How far the photographed paths of all experiments together are from those of a model; the cracks are left out.
+SimulatedPath together(const Fit& fit, const std::string& model);
 
 } // namespace crampfit

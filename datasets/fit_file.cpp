@@ -1,3 +1,4 @@
+#include "datasets/crack_paths_file.hpp"
 #include "datasets/hdf5.hpp"
 #include "datasets/io.hpp"
 
@@ -338,6 +339,7 @@ void write(const Fit& fit, const std::filesystem::path& file) {
         write_checks(root, fit.checks);
         write_distances(root, fit.distances);
         write_models(root, fit.models, fit.parameters.size());
+        write_crack_paths(root, fit.crack_paths);
         write_profile(root, fit.profile);
         write_posterior(root, fit.posterior, fit.parameters.size());
     });
@@ -362,6 +364,8 @@ Fit read_fit(const std::filesystem::path& file) {
     fit.checks = read_checks(root.group("checks"));
     fit.distances = read_distances(root.group("distances"));
     fit.models = read_models(root.group("models"), fit.parameters.size());
+    if (root.has("crack paths"))
+        fit.crack_paths = read_crack_paths(root);
     fit.profile = read_profile(root.group("profile"));
     fit.posterior = read_posterior(root.group("posterior"), fit.parameters.size());
     return fit;

@@ -3,7 +3,6 @@
 #include "datasets/limits.hpp"
 #include "datasets/study_parts.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <fmt/format.h>
 
@@ -16,35 +15,6 @@ namespace {
 
 // More points than this say hardly more about a few parameters.
 constexpr int most_points = 4000;
-
-/// How the pictures lie on the specimen.
-struct Placement {
-    double pixel = 0;            // [m]
-    Vec2 offset = Vec2::Zero();  // of the reference's lower left corner in the specimen [m]
-    double rotation = 0;         // of the pictures about that corner, counter-clockwise [rad]
-    int picture_rows = 0;
-
-    Vec2 turned(const Vec2& v) const { return Eigen::Rotation2Dd(rotation) * v; }
-    Vec2 place(double x, double y) const { return offset + turned(pixel * Vec2(x + 0.5, picture_rows - 0.5 - y)); }
-    Vec2 displacement(double u, double v) const { return turned(pixel * Vec2(u, -v)); }
-};
-
-Placement read_placement(const Entry& entry, const FieldSeries& series) {
-    Placement placement;
-    const auto pixel = entry.is_table() ? entry.find("pixel") : std::nullopt;
-    if (!pixel && !series.pixel) {
-        entry.fail("the file does not know the edge of a pixel: give it as in { file = \"...\", pixel = \"10 um\" }");
-    }
-    placement.pixel = pixel ? pixel->number(limits::pixel) : *series.pixel;
-    placement.picture_rows = series.rows;
-    if (const auto offset = entry.is_table() ? entry.find("offset") : std::nullopt) {
-        placement.offset = offset->point();
-    }
-    if (const auto rotation = entry.is_table() ? entry.find("rotation") : std::nullopt) {
-        placement.rotation = rotation->number(limits::rotation);
-    }
-    return placement;
-}
 
 /// When the pictures were taken: from a table that the study names, or as the file has it.
 void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields& fields) {
@@ -129,7 +99,7 @@ MeasuredFields read_measured_fields(const Entry& entry, const Scene& scene) {
     if (series.rows == 0) {
         entry.fail("the file does not know the size of the pictures: correlate them again");
     }
-    const Placement placement = read_placement(entry, series);
+    const Placement placement = read_placement(entry, series.pixel, series.rows);
     read_instants(entry, series, fields);
     if (const auto camera = entry.is_table() ? entry.find("camera") : std::nullopt) {
         fields.camera_moves = camera->choice<bool>({{"moves", true}, {"still", false}});

@@ -67,7 +67,7 @@ Machine read_machine(const Entry& experiment, const Curves& data) {
 }
 
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
-    entry.only({"name", "scene", "data", "fields", "noise", "weight", "compliance", "force_offset", "displacement_offset"});
+    entry.only({"name", "scene", "data", "fields", "photograph", "noise", "weight", "compliance", "force_offset", "displacement_offset"});
     Experiment experiment;
     const auto name = entry.find("name");
     experiment.name = name ? name->text() : fmt::format("experiment {}", number);
@@ -79,6 +79,9 @@ Experiment read_experiment(const Entry& entry, std::size_t number, const Overrid
     if (entry.has("data") || !experiment.fields) {
         experiment.data_file = entry.at("data").existing_file();
         experiment.data = read_curves(experiment.data_file);
+    }
+    if (const auto photograph = entry.find("photograph")) {
+        experiment.photograph = read_photograph(*photograph, experiment.scene);
     }
     if (const auto noise = entry.find("noise")) {
         experiment.noise = read_noise(*noise, experiment.data, experiment.fields.has_value());

@@ -211,6 +211,30 @@ Table models_table(const Fit& fit) {
     return table;
 }
 
+Table paths_table(const Fit& fit) {
+    Table table{{"experiment", "model", "crack", "x_m", "y_m"}};
+    const auto add = [&](const CrackPaths& paths, const std::string& model, const std::string& crack, const std::vector<Vec2>& vertices) {
+        for (const Vec2& vertex : vertices)
+            table.push_back({paths.experiment, model, crack, text_of(vertex.x()), text_of(vertex.y())});
+    };
+    for (const CrackPaths& paths : fit.crack_paths) {
+        add(paths, "", "photographed", paths.photographed);
+        for (const SimulatedPath& simulated : paths.simulated)
+            for (std::size_t i = 0; i < simulated.cracks.size(); ++i)
+                add(paths, simulated.model, std::to_string(i), simulated.cracks[i]);
+    }
+    return table;
+}
+
+Table path_distances_table(const Fit& fit) {
+    Table table{{"experiment", "model", "mean_m", "largest_m", "compared_length_m", "status"}};
+    for (const CrackPaths& paths : fit.crack_paths)
+        for (const SimulatedPath& simulated : paths.simulated)
+            table.push_back({paths.experiment, simulated.model, text_of(simulated.mean_distance), text_of(simulated.largest_distance),
+                             text_of(simulated.compared_length), simulated.status});
+    return table;
+}
+
 Table profile_table(const Fit& fit) {
     Table table{{"parameter", "value", "misfit"}};
     for (const ProfilePoint& point : fit.profile)
@@ -240,6 +264,8 @@ std::vector<Offer> offers(const Fit& fit) {
             {"checks", [&] { return checks_table(fit); }},
             {"distances", [&] { return distances_table(fit); }},
             {"models", [&] { return models_table(fit); }},
+            {"paths", [&] { return paths_table(fit); }},
+            {"path_distances", [&] { return path_distances_table(fit); }},
             {"profile", [&] { return profile_table(fit); }},
             {"posterior", [&] { return posterior_table(fit); }}};
 }
@@ -373,8 +399,17 @@ Table tip_table(const CrackTrack& track) {
     return table;
 }
 
+Table ways_table(const CrackTrack& track) {
+    Table table{{"image", "x_px", "y_px"}};
+    for (std::size_t i = 0; i < track.tips.size(); ++i)
+        for (const Vec2& point : track.tips[i].way)
+            table.push_back({std::to_string(i), fmt::format("{:.2f}", point.x()), fmt::format("{:.2f}", point.y())});
+    return table;
+}
+
 std::vector<Offer> offers(const CrackTrack& track) {
     return {{"series", [&] { return tip_table(track); }},
+            {"ways", [&] { return ways_table(track); }},
             {"images", [&] { return image_table(track.reference, track.images); }},
             {"experiment", [&] { return curves_table(curves_of(track)); }}};
 }

@@ -267,6 +267,18 @@ cv::Mat join_patches(const Patches& patches, const cv::Mat& ground) {
     return joined;
 }
 
+/// The middle of the strongest line that has darkened, where it is long and slender; `ground` is the reference.
+std::optional<DarkWay> line_in(const Contrast& contrast, const cv::Mat& ground) {
+    if (contrast.dark.strongest == 0)
+        return std::nullopt;
+    const cv::Mat joined = join_patches(contrast.dark, ground);
+    const DarkWay way = middle_of(joined, ground);
+    const double length = static_cast<double>(way.points.size()), width = cv::countNonZero(joined) / length;
+    if (length < std::max(least_length, least_slender * width))
+        return std::nullopt;
+    return way;
+}
+
 }  // namespace
 
 cv::Point2d direction_at(const std::vector<cv::Point2d>& line, bool back, int reach) {
@@ -282,18 +294,20 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     cv::erode(counts, inner, disk(tolerance));
     const double least = std::max(least_dark * robust_deviation(now - before, inner), least_share * cv::mean(before, inner)[0]);
     const Contrast contrast = compare(before, now, inner, least, tolerance);
-    if (contrast.dark.strongest == 0)
+    const std::optional<DarkWay> way = line_in(contrast, before);
+    if (!way)
         return std::nullopt;
-    const cv::Mat joined = join_patches(contrast.dark, before);
-    const DarkWay way = middle_of(joined, before);
-    const double length = static_cast<double>(way.points.size()), width = cv::countNonZero(joined) / length;
-    if (length < std::max(least_length, least_slender * width))
-        return std::nullopt;
-    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well.
-    const int opened = static_cast<int>(std::ceil(*std::ranges::max_element(way.half_width)));
-    if (contrast.is_crack() || compare(before, now, inner, least, tolerance + opened).is_crack())
+    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well. Where the
+    // specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the crack.
+    const int opened = static_cast<int>(std::ceil(*std::ranges::max_element(way->half_width)));
+    const bool apart = opened > tolerance && !way->ends_inside;
+    if (!apart && contrast.is_crack())
         return way;
-    return std::nullopt;
+    const Contrast farther = compare(before, now, inner, least, tolerance + opened);
+    if (apart && farther.is_crack())
+        if (const std::optional<DarkWay> clear = line_in(farther, before))
+            return clear;
+    return contrast.is_crack() || farther.is_crack() ? way : std::nullopt;
 }
 
 }  // namespace crampfit

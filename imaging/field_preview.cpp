@@ -111,13 +111,15 @@ void draw_track(const FinePicture& image, const std::vector<CrackTip>& tips, con
     for (const CrackTip& tip : tips)
         if (tip.status == TipStatus::ok)
             cv::circle(drawing, pixel(tip.tip), 3, {200, 80, 0}, 1, cv::LINE_AA);
-    if (const CrackTip& last = tips.back(); last.status == TipStatus::ok) {
-        const Vec2 mouth = last.tip - last.length * Vec2(std::cos(last.angle), std::sin(last.angle));
-        const std::vector<Vec2> way = last.way.empty() ? std::vector{mouth, last.tip} : last.way;
-        for (std::size_t i = 1; i < way.size(); ++i)
-            cv::line(drawing, pixel(way[i - 1]), pixel(way[i]), {0, 0, 220}, 1, cv::LINE_AA);
+    const CrackTip& last = tips.back();
+    std::vector<Vec2> way = last.way;
+    if (last.status == TipStatus::ok) {
         cv::drawMarker(drawing, pixel(last.tip), {0, 0, 220}, cv::MARKER_CROSS, 15, 2);
+        if (way.empty())
+            way = {last.tip - last.length * Vec2(std::cos(last.angle), std::sin(last.angle)), last.tip};
     }
+    for (std::size_t i = 1; i < way.size(); ++i)
+        cv::line(drawing, pixel(way[i - 1]), pixel(way[i]), {0, 0, 220}, 1, cv::LINE_AA);
     write_drawing(drawing, file);
 }
 

@@ -1,6 +1,6 @@
 #include "imaging/gray_track.hpp"
 
-#include "imaging/dark_way.hpp"
+#include "imaging/closed_way.hpp"
 #include "imaging/line_up.hpp"
 #include "imaging/opening.hpp"
 
@@ -88,7 +88,7 @@ OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, cons
 struct Tip {
     cv::Point2d place, direction;
     double along, sigma;  // from the line's first point [px]
-    std::vector<cv::Point2d> way;
+    std::vector<cv::Point2d> last;  // stretch of the line, up to the tip
 };
 
 /// The tip along a line that is lost at its end.
@@ -108,10 +108,9 @@ std::optional<Tip> tip_along(const cv::Mat& reference, const cv::Mat& seen, cons
     const auto i = static_cast<std::size_t>(start->place);
     const double part = start->place - static_cast<double>(i);
     const cv::Point2d place = line[i] + part * (line[std::min(i + 1, line.size() - 1)] - line[i]);
-    std::vector<cv::Point2d> whole(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(from));
-    whole.insert(whole.end(), line.begin(), line.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-    whole.push_back(place);
-    return Tip{place, d, static_cast<double>(from) + start->place, start->sigma, std::move(whole)};
+    line.resize(i + 1);
+    line.push_back(place);
+    return Tip{place, d, static_cast<double>(from) + start->place, start->sigma, std::move(line)};
 }
 
 /// How much a place counts when the wood about the tip is lined up.
@@ -128,6 +127,13 @@ DarkWay moved(DarkWay way, const Alignment& from, const Alignment& to) {
     for (cv::Point2d& point : way.points)
         point = to.to_reference(from.to_image(point));
     return way;
+}
+
+std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
+    std::vector<Vec2> result;
+    for (const cv::Point2d& point : points)
+        result.emplace_back(point.x, point.y);
+    return result;
 }
 
 }  // namespace
@@ -168,6 +174,7 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
         return found;
     if (!way->ends_inside) {
         found.status = TipStatus::outside;
+        found.way = vectors(closed_way(reference, image, weight, whole, *way));
         return found;
     }
     // The wood about the tip moves by itself: once more, lined up there.
@@ -179,8 +186,10 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);
     found.length = to_border(way->points.front(), direction_at(way->points, false, heading), size) + tip->along;
-    for (const cv::Point2d& point : tip->way)
-        found.way.emplace_back(point.x, point.y);
+    std::vector<cv::Point2d> points = closed_way(reference, image, weight, whole, *way);
+    points.resize(points.size() > behind ? points.size() - behind : 0);
+    points.insert(points.end(), tip->last.begin(), tip->last.end());
+    found.way = vectors(points);
     found.sigma = std::hypot(tip->sigma, place_error);
     return found;
 }

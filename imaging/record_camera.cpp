@@ -33,13 +33,19 @@ VirtualCameraOptions sized(VirtualCameraOptions options, const Vec2& size, doubl
     return options;
 }
 
+Surface seen_in(const CameraView& view, const std::function<double(const Vec2&)>& wood) {
+    if (!wood)
+        return {};
+    return [=](const Vec2& px) { return wood(view.to_specimen(px)); };
+}
+
 }  // namespace
 
-RecordCamera::RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin, VirtualCameraOptions options)
+RecordCamera::RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin, VirtualCameraOptions options,
+                           const std::function<double(const Vec2&)>& wood)
     : record_(record), file_(file),
-      camera_(options = sized(options, upper_right(record, file) + Vec2::Constant(2 * margin), pixel)) {
-    view_ = {Vec2::Constant(-margin), pixel, options.rows};
-}
+      view_{Vec2::Constant(-margin), pixel, (options = sized(options, upper_right(record, file) + Vec2::Constant(2 * margin), pixel)).rows},
+      camera_(options, seen_in(view_, wood)) {}
 
 GrayPicture RecordCamera::reference() const {
     const FrameMotion motion(record_, 0, file_);

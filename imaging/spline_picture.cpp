@@ -1,6 +1,7 @@
 #include "imaging/spline_picture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace crampfit {
@@ -68,6 +69,26 @@ void SplinePicture::mirror_margins() {
         for (const int row : {-beyond, rows_ - 1 + beyond})
             std::copy_n(coefficients_.data() + index(-margin, mirrored(row, rows_)), stride_,
                         coefficients_.data() + index(-margin, row));
+}
+
+double SplinePicture::gray(double x, double y) const {
+    const auto inside = [](double at, int count) {
+        const double end = std::max(count - 1, 1), turned = std::fmod(std::abs(at), 2 * end);
+        return turned <= end ? turned : 2 * end - turned;
+    };
+    const double xi = inside(x, columns_), yi = inside(y, rows_);
+    const int column = static_cast<int>(xi), row = static_cast<int>(yi);
+    // Weights of the four coefficients about a place, t beyond the second of them (Unser 1999, eq. 4).
+    const auto weights = [](double t) {
+        const double s = 1 - t;
+        return std::array{s * s * s / 6, 2.0 / 3 - t * t * (2 - t) / 2, 2.0 / 3 - s * s * (2 - s) / 2, t * t * t / 6};
+    };
+    const auto across = weights(xi - column), down = weights(yi - row);
+    double sum = 0;
+    for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i)
+            sum += down[j] * across[i] * static_cast<double>(*at(column - 1 + i, row - 1 + j));
+    return sum;
 }
 
 SplinePicture::Slopes SplinePicture::slopes() const {

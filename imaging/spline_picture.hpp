@@ -22,6 +22,9 @@ class SplinePicture {
     /// The coefficient of a pixel; column and row may lie `margin` pixels outside the picture.
     const float* at(int column, int row) const { return coefficients_.data() + index(column, row); }
 
+    /// Gray at any place [px]; beyond the picture that of the mirror image.
+    double gray(double x, double y) const;
+
     /// Gray and its slopes at all pixels [rows x columns].
     struct Slopes {
         std::vector<float> by_x, by_y;  // [gray/px]

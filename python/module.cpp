@@ -10,8 +10,10 @@
 #include "datasets/io.hpp"
 #include "datasets/tables.hpp"
 #include "forward/simulate.hpp"
+#include "imaging/photograph.hpp"
 #include "imaging/picture.hpp"
 #include "inverse/compare.hpp"
+#include "inverse/crack_paths.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/sensitivity.hpp"
 
@@ -173,17 +175,7 @@ Scene open_scene(const Path& file, const py::dict& settings) {
 
 Study open_study(const Path& file, const py::dict& settings) {
     Study study = read_study(file, overrides_of(settings));
-    if (study.scene) {
-        load_specimen(*study.scene);
-    }
-    for (Experiment& experiment : study.experiments) {
-        load_specimen(experiment.scene);
-    }
-    for (ModelChoice& model : study.models) {
-        for (Scene& scene : model.scenes) {
-            load_specimen(scene);
-        }
-    }
+    load_pictures(study);
     return study;
 }
 
@@ -210,7 +202,9 @@ Fit run_fit(const Path& file, const py::dict& settings, int threads, const std::
     auto options = options_of<FitOptions>(threads, keep, resume);
     return interruptible([&](const std::atomic<bool>* stop) {
         options.stop_requested = stop;
-        return fit_models(study, options);
+        Fit fit = fit_models(study, options);
+        fit.crack_paths = crack_paths(study, fit, threads, stop);
+        return fit;
     });
 }
 

@@ -85,6 +85,12 @@ Fit small_fit() {
         fit.runs.push_back(
             {{60.0 - i, 80.0 + i}, i == 3 ? INFINITY : 100.0 / (i + 1), i == 3 ? "did not converge" : "finished", 0.1});
     }
+    fit.models = {{"hoop stress", "converged", 5, {40, 100}, 9, 11, 0.9}, {"straight", "converged", 9, {41, 99}, 13, 15, 0.1}};
+    const std::vector<Vec2> photographed{{0, 5e-3}, {4e-3, 5e-3}, {9e-3, 7e-3}}, straight{{0, 5e-3}, {9e-3, 5e-3}};
+    fit.crack_paths = {{"pull", true, {200, 100, std::vector<std::uint8_t>(20000, 180), {-1e-3, 0}, {11e-3, 6e-3}}, photographed,
+                        {{"hoop stress", "finished", {photographed}, 1e-5, 2e-5, 5e-3}, {"straight", "split", {straight}, 1e-3, 2e-3, 5e-3}}},
+                       {"other", false, {30, 30, std::vector<std::uint8_t>(900, 90), {0, 0}, {1e-2, 1e-2}}, {},
+                        {{"hoop stress", "no run ended well", {}}, {"straight", "finished", {straight}}}}};
     fit.checks = {{"pull", "force", 20, 0.8, 1, 0.9, 1e-5}, {"pull", "arrival", 20, 0, 1, 0, 0.5}};
     fit.misfit = 5;
     fit.reduced_chi_square = 0.2;
@@ -149,6 +155,43 @@ TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
     // legend.
     EXPECT_EQ(count(page, "<circle "), 20 + 1 + 20 + 20 + 1 + 20 + 20 + 20 + 19 + 1);
     EXPECT_FALSE(contains(page, "nan") || contains(page, "inf ")) << "in a path";
+}
+
+TEST(SystemReport, PageOfAFitShowsThePathOfEachModelOverThePhotographedOne) {
+    Command command;
+    write(small_fit(), command.path("fit.h5"));
+    const std::string page = report(command, "fit.h5");
+    // In the table of evidence: over both experiments, of which one was photographed.
+    for (const char* part : {"Path off by, mean [mm]", "<td class=\"number\">0.010</td><td class=\"number\">0.020</td>",
+                             "<td class=\"number\">1.000</td><td class=\"number\">2.000</td>", "Over [mm]", "no run ended well", "pull: photograph",
+                             "pull: hoop stress", "pull: straight", "other: wood of the model", "other: straight"})
+        EXPECT_TRUE(contains(page, part)) << part;
+    EXPECT_FALSE(contains(page, "other: hoop stress")) << "it has no path";
+    // All over the whole, and each by itself; of the other experiment one path.
+    EXPECT_EQ(count(page, "<image "), 3 + 2);
+    EXPECT_EQ(count(page, ">photographed</text>"), 3);
+    Fit plain = small_fit();
+    plain.crack_paths.clear();
+    write(plain, command.path("plain.h5"));
+    EXPECT_FALSE(contains(report(command, "plain.h5"), "Crack paths"));
+}
+
+// Noise is what compresses worst.
+TEST(SystemReport, PageOfManyPhotographsStaysSmall) {
+    Command command;
+    Fit fit = small_fit();
+    fit.crack_paths.resize(1);
+    PlanePicture& picture = fit.crack_paths[0].picture;
+    picture.columns = picture.rows = 1600;
+    std::mt19937 random(1);
+    picture.gray.clear();
+    for (int i = 0; i < 1600 * 1600; ++i)
+        picture.gray.push_back(static_cast<std::uint8_t>(random()));
+    fit.crack_paths.resize(4, fit.crack_paths[0]);
+    write(fit, command.path("fit.h5"));
+    const std::string page = report(command, "fit.h5");
+    std::printf("page of four photographs of noise and two models each: %.2f MB\n", 1e-6 * static_cast<double>(page.size()));
+    EXPECT_EQ(count(page, "<image "), 12);
 }
 
 TEST(SystemReport, PageOfASensitivityStudy) {
@@ -228,5 +271,11 @@ TEST(SystemReport, PageRunsInABrowserWithoutAWordOnTheConsole) {
     ASSERT_EQ(std::system(fmt::format(fmt::runtime(browse), command.path("")).c_str()), 0);
     EXPECT_TRUE(contains(command.folder.read("dom.html"), "<div class=\"slider\"><label>"));
     EXPECT_TRUE(contains(command.folder.read("dom.html"), "aria-valuetext=\"Frame "));
+    EXPECT_FALSE(contains(command.folder.read("log.txt"), "CONSOLE")) << command.folder.read("log.txt");
+    // A fit's page: all its pictures are drawn.
+    write(small_fit(), command.path("fit.h5"));
+    report(command, "fit.h5");
+    ASSERT_EQ(std::system(fmt::format(fmt::runtime(browse), command.path("")).c_str()), 0);
+    EXPECT_EQ(count(command.folder.read("dom.html"), "<image "), 5);
     EXPECT_FALSE(contains(command.folder.read("log.txt"), "CONSOLE")) << command.folder.read("log.txt");
 }

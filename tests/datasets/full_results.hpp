@@ -1,5 +1,6 @@
 #pragma once
 
+#include "datasets/crack_track.hpp"
 #include "datasets/fit.hpp"
 #include "datasets/record.hpp"
 #include "datasets/record_file.hpp"
@@ -106,6 +107,9 @@ inline Fit full_fit() {
     fit.distances = {{"wedge 1", "force", 1.0 / 3.0, 0.25, -0.0, not_a_number}};
     fit.models = {{"hoop stress", "converged", 1.0 / 3.0, {0.1, 0.2}, 4.3, 5.4, 0.9},
                   {"straight", "failed", infinite, {0.3, 0.4}, infinite, infinite, 0.0}};
+    fit.crack_paths = {{"wedge 1", true, {3, 2, {1, 2, 3, 4, 5, 255}, {-0.0, -1.0 / 3.0}, {0.1, 5e-324}}, some_points(3),
+                        {{"hoop stress", "finished", {some_points(2), {}}, 1.0 / 3.0, infinite, -0.0}, {"straight", "no run ended well", {}}}},
+                       {"block", false, {1, 1, {0}, {0, 0}, {1, 1}}, {}, {}}};
     fit.checks = {{"wedge 1", "force", 50, 12.5, 1.0 / 3.0, -0.0, not_a_number}};
     fit.profile = {{"EW, toughness", 80.5, infinite}, {"LW \"hard\"", -0.0, 1.0 / 3.0}};
     fit.posterior = {{{80.0, 1.0 / 3.0}, 12.75}, {{infinite, -0.0}, 13.0}};
@@ -113,6 +117,21 @@ inline Fit full_fit() {
     fit.seed = 4000000000u;
     fit.study_text = "title = 'ü'";
     return fit;
+}
+
+/// Followed, not found, found as the tip of a straight crack, gone through the picture.
+inline CrackTrack full_track() {
+    CrackTrack track;
+    track.reference = "reference.png";
+    track.images = {"a.png", "b.png", "c.png", "d.png"};
+    track.pixel = 1.0 / 3.0;
+    track.columns = 640;
+    track.rows = 480;
+    track.tips = {{TipStatus::ok, {10, 20}, 0.5, 30, 1.0 / 3.0, some_points(4)},
+                  {.status = TipStatus::no_crack},
+                  {.status = TipStatus::ok, .tip = {11, 21}, .angle = -0.0, .length = 31, .sigma = 5e-324},
+                  {.status = TipStatus::outside, .way = some_points(5)}};
+    return track;
 }
 
 inline Sensitivity full_sensitivity() {

@@ -140,6 +140,27 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
         EXPECT_TRUE(same_bits(figures(after.models[i]), figures(before.models[i])));
         EXPECT_TRUE(same_bits(after.models[i].values, before.models[i].values));
     }
+    ASSERT_EQ(after.crack_paths.size(), before.crack_paths.size());
+    for (std::size_t i = 0; i < 2; ++i) {
+        const CrackPaths &a = after.crack_paths[i], &b = before.crack_paths[i];
+        EXPECT_EQ(a.experiment, b.experiment);
+        EXPECT_EQ(a.on_photograph, b.on_photograph);
+        EXPECT_EQ(a.picture.columns, b.picture.columns);
+        EXPECT_EQ(a.picture.rows, b.picture.rows);
+        EXPECT_EQ(a.picture.gray, b.picture.gray);
+        EXPECT_TRUE(same_bits(std::vector{a.picture.low, a.picture.high}, std::vector{b.picture.low, b.picture.high}));
+        EXPECT_TRUE(same_bits(a.photographed, b.photographed));
+        ASSERT_EQ(a.simulated.size(), b.simulated.size());
+        for (std::size_t k = 0; k < a.simulated.size(); ++k) {
+            const auto figures = [](const SimulatedPath& s) { return std::vector{s.mean_distance, s.largest_distance, s.compared_length}; };
+            EXPECT_EQ(a.simulated[k].model, b.simulated[k].model);
+            EXPECT_EQ(a.simulated[k].status, b.simulated[k].status);
+            EXPECT_TRUE(same_bits(figures(a.simulated[k]), figures(b.simulated[k])));
+            ASSERT_EQ(a.simulated[k].cracks.size(), b.simulated[k].cracks.size());
+            for (std::size_t crack = 0; crack < a.simulated[k].cracks.size(); ++crack)
+                EXPECT_TRUE(same_bits(a.simulated[k].cracks[crack], b.simulated[k].cracks[crack]));
+        }
+    }
     ASSERT_EQ(after.profile.size(), before.profile.size());
     ASSERT_EQ(after.posterior.size(), before.posterior.size());
     for (std::size_t i = 0; i < 2; ++i) {
@@ -153,6 +174,38 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
                           std::vector{before.misfit, before.reduced_chi_square, before.seconds}));
     EXPECT_EQ(after.seed, before.seed);
     EXPECT_EQ(after.study_text, before.study_text);
+}
+
+TEST(UnitHdf5, TrackComesBackBitForBit) {
+    const TemporaryFolder folder;
+    const CrackTrack before = full_track();
+    write(before, folder / "track.h5");
+    const CrackTrack after = read_crack_track(folder / "track.h5");
+    EXPECT_EQ(after.reference, before.reference);
+    EXPECT_EQ(after.images, before.images);
+    EXPECT_TRUE(same_bits(*after.pixel, *before.pixel));
+    EXPECT_EQ(after.columns, before.columns);
+    EXPECT_EQ(after.rows, before.rows);
+    ASSERT_EQ(after.tips.size(), before.tips.size());
+    for (std::size_t i = 0; i < before.tips.size(); ++i) {
+        const CrackTip &a = after.tips[i], &b = before.tips[i];
+        EXPECT_EQ(a.status, b.status);
+        EXPECT_TRUE(same_bits(std::vector{a.tip.x(), a.tip.y(), a.angle, a.length, a.sigma}, std::vector{b.tip.x(), b.tip.y(), b.angle, b.length, b.sigma}));
+        EXPECT_TRUE(same_bits(a.way, b.way)) << i;
+    }
+}
+
+// The last way that was followed; without any, from the mouth of the first tip through all.
+TEST(UnitTrack, PathIsTheLastWayOrLeadsThroughTheTips) {
+    CrackTrack track = full_track();
+    EXPECT_TRUE(same_bits(path_of(track), track.tips[3].way));
+    for (CrackTip& tip : track.tips)
+        tip.way.clear();
+    track.tips[0].angle = 0;  // to the right
+    const std::vector<Vec2> path = path_of(track);
+    EXPECT_TRUE(same_bits(path, std::vector<Vec2>{{-20, 20}, {10, 20}, {11, 21}}));
+    track.tips.clear();
+    EXPECT_TRUE(path_of(track).empty());
 }
 
 TEST(UnitHdf5, SensitivityRoundTrip) {

@@ -1,5 +1,6 @@
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "tests/datasets/full_results.hpp"
 #include "tests/datasets/good_scenes.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -175,6 +176,48 @@ TEST(UnitStudy, ModelsToCompare) {
     ASSERT_EQ(study.models[1].scenes.size(), 2u);
     EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").youngs_modulus, 60e6);
     EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").density, 333);
+}
+
+// A picture of 400 x 200 pixels of 50 um, turned by a quarter about its lower left corner at 12, 1 mm: up the picture is to the left.
+TEST(UnitStudy, PhotographOfACrack) {
+    const StudyFolder folder;
+    const auto with = [](const std::string& photograph) {
+        std::string text = good_study;
+        return text.insert(text.find("weight = 2.0"), "photograph = " + photograph + "\n");
+    };
+    CrackTrack track = full_track();
+    track.pixel = 50e-6;
+    track.columns = 400;
+    track.rows = 200;
+    track.images = {"last.png"};
+    track.tips = {{.status = TipStatus::ok, .tip = {149.5, 99.5}, .way = {{-0.5, 99.5}, {149.5, 99.5}}}};
+    write(track, folder / "track.h5");
+    folder.write("last.png", "");  // read later
+    const Study study = folder.read(with(R"({ picture = "last.png", track = "track.h5", offset = ["12 mm", "1 mm"], rotation = "90 deg" })"));
+    ASSERT_TRUE(study.experiments[0].photograph);
+    EXPECT_FALSE(study.experiments[1].photograph);
+    const Photograph& photograph = *study.experiments[0].photograph;
+    EXPECT_EQ(photograph.file, folder / "last.png");
+    ASSERT_EQ(photograph.path.size(), 2u);
+    EXPECT_NEAR((photograph.path[0] - Vec2(7e-3, 1e-3)).norm(), 0, 1e-12);
+    EXPECT_NEAR((photograph.path[1] - Vec2(7e-3, 8.5e-3)).norm(), 0, 1e-12);
+
+    const auto refused = [&](const std::string& photograph_of, const std::string& key, const std::string& phrase) {
+        expect_error((folder / "study.toml").string(), "experiments.wedge 1.photograph" + key, phrase, [&] { folder.read(with(photograph_of)); });
+    };
+    refused("{ }", ".picture", "missing");
+    refused(R"({ picture = "last.png" })", "", "edge of a pixel");
+    refused(R"({ picture = "none.png", pixel = "50 um" })", ".picture", "no such file");
+    refused(R"({ track = "none.h5" })", ".track", "no such file");
+    refused(R"({ tracks = "track.h5" })", ".tracks", "did you mean \"track\"?");
+    refused(R"({ track = "track.h5", pixel = "0 um" })", ".pixel", "greater than 0");
+    refused(R"({ track = "track.h5", offset = ["1 m", "0 m"] })", "", "does not lie on the specimen");
+    track.tips[0] = {.status = TipStatus::no_crack};
+    write(track, folder / "track.h5");
+    refused(R"({ track = "track.h5" })", ".track", "no crack in any image");
+    track.rows = 0;
+    write(track, folder / "track.h5");
+    refused(R"({ track = "track.h5" })", ".track", "size of the pictures");
 }
 
 TEST(UnitStudy, WhatIsWrongIsSaid) {

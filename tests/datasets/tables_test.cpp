@@ -166,7 +166,7 @@ TEST(UnitTables, UnknownTableListsThoseThatThereAre) {
     write(small_record(), folder / "record.h5");
     EXPECT_EQ(refusal(folder / "record.h5", "serie"), "must be one of: series, path, crack1, path1, driving, reactions");
     write(small_fit(), folder / "fit.h5");
-    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation, checks, distances, models, profile, posterior");
+    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation, checks, distances, models, paths, path_distances, profile, posterior");
     Specimen specimen;
     specimen.pixel = 1e-5;
     write(specimen, folder / "specimen.h5");

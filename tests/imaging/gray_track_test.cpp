@@ -84,6 +84,33 @@ TEST(SlowGrayTrack, TipsOfMoreCracksInWood) {
                  {"from above", 1.57, 2, 50, {-2000, 200}, 5, 2}});
 }
 
+// A specimen that has come apart: its lower part is held, the upper one has moved by 10 px. The way is where the wood parted, not in the middle
+// of the gap, which lies 5 px above; nor along a ring that the motion darkens. Bar: a few pixels, as for tips; 10 px from the picture's sides.
+TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
+    const WoodCamera camera(end_grain_picture(columns, rows, 90, {-600, -900}, 3), 10);
+    const GrayTracker tracker(camera.take({}), {});
+    const auto crack = [](double x) { return 200 + 15 * std::sin(x / 70); };
+    WoodShot shot;
+    shot.seed = 12;
+    shot.displacement = [&](const Vec2& px) { return px.y() < crack(px.x()) ? Vec2(1.5, -10) : Vec2(0, 0); };
+    const CrackTip tip = tracker.tip(camera.take(shot));
+    EXPECT_EQ(tip.status, TipStatus::outside);
+    ASSERT_GT(tip.way.size(), 400u);
+    double worst = 0, sum = 0;
+    int count = 0;
+    for (const Vec2& point : tip.way) {
+        if (point.x() < 10 || point.x() > columns - 10)
+            continue;
+        const double off = point.y() - crack(point.x());
+        worst = std::max(worst, std::abs(off));
+        sum += off;
+        ++count;
+    }
+    std::printf("way of a crack that has gone through: off by %.2f px on average, %.2f px at most\n", sum / count, worst);
+    EXPECT_LT(std::abs(sum / count), 2);
+    EXPECT_LT(worst, 5);
+}
+
 TEST(VerificationGrayTrack, NoneWhereThereIsNoCrack) {
     const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10);
     const GrayTracker tracker(camera.take({}), {});
