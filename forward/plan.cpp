@@ -1,6 +1,7 @@
 #include "forward/plan.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/bridging.hpp"
 #include "forward/history.hpp"
 #include "forward/march.hpp"
 #include "forward/memory_check.hpp"
@@ -76,6 +77,10 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
         const Crack& crack = scene.cracks[k];
         const std::string key = "cracks." + std::to_string(k);
+        if (quasistatic && crack.faces.bridging)
+            refuse(scene, key + ".faces.traction", fmt::format("{:g} MPa", crack.faces.bridging->stress * 1e-6),
+                   "not available at equilibrium, where the energy that an advance releases is taken from the two ends of it: faces that soften "
+                   "take some on the way; use solver.kind = \"explicit\", and a load that does not take long");
         if (crack.direction == GrowthDirection::energy_release_rate && crack.grows != Growth::none && orthotropic)
             refuse(scene, key + ".direction", "energy release rate",
                    "not available in orthotropic wood, for whose branches no solution is built in; use \"hoop stress\", \"normal to opening\" or \"straight\"");
@@ -236,6 +241,22 @@ void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials
                             "external work = strain + kinetic + fracture energy + what wood, damping and friction dissipate"});
 }
 
+// A zone of bridged faces is about as long as E' times the energy over the stress squared (Hillerborg, Modeer and Petersson 1976).
+void choose_bridging(const Scene& scene, Plan& plan, const Discretisation& body) {
+    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
+        const auto& law = scene.cracks[k].faces.bridging;
+        if (!law) continue;
+        double softest = std::numeric_limits<double>::infinity();
+        for (int p = 0; p < body.points.count(); ++p) softest = std::min(softest, body.points.stiffest(p));
+        const double cells = softest * law->energy() / (law->stress * law->stress) / body.layout.cell.maxCoeff();
+        plan.choices.push_back({fmt::format("bridging of {}", k),
+                                fmt::format("{} MPa falling to nothing at {} mm, {:.4g} J/m^2 beyond the toughness of the tip, on {} faces",
+                                            law->stress * 1e-6, law->opening * 1e3, law->energy(), law->on_all_faces ? "all" : "new"),
+                                fmt::format("asked for in cracks.{}.faces.traction; softens over about {:.2g} cells{}; G and K are those of the tip", k, cells,
+                                            cells < 3.0 ? ": fewer than 3, where the course of the force hangs on the cell" : "")});
+    }
+}
+
 } // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -256,12 +277,13 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.still_from = travel.until;
     for (const Crack& crack : scene.cracks) plan.grows |= crack.grows != Growth::none;
     for (const Crack& crack : scene.cracks) plan.friction |= crack.faces.coefficient > 0.0;
+    const bool bridged = BridgedFaces::are_in(scene);
     for (const Body& rigid : scene.bodies) {
         plan.friction |= rigid.contact.coefficient > 0.0;
         plan.free_bodies |= rigid.free[0] || rigid.free[1];
     }
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
+                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) && !bridged &&
                         (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     plan.remembers = materials.remembers();
@@ -281,6 +303,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
+        : bridged ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
         : starts_in_motion(scene) ? "a part starts in motion"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic)
@@ -339,6 +362,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;
 
+    choose_bridging(scene, plan, body);
     const double highest = highest_frequency_squared(body);
     plan.added_frequency_squared = plan.contact || parts_touch || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
