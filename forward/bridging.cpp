@@ -10,15 +10,14 @@ namespace crampfit {
 
 namespace {
 
-constexpr double places_in_cell = 16.0;  // at which faces of the start are shared out
+constexpr double places_in_cell = 16.0;  // along a crack, at which its faces are shared out
+
+// Ties are made softer for bridges that soften as fast as the wood yields to no more than this part of the wood's stiffness.
+constexpr double least_stiffness_left = 0.1;
 
 double opening_of(const FieldPair& pair, const std::vector<Vec2>& displacement) {
     return (displacement[pair.left] - displacement[pair.right]).dot(pair.normal);
 }
-
-// How much of the crack a pair stands for. Of a hat on a node as far from the crack as leaves it the value N there, the part N^2 / 2
-// lies beyond.
-double weight_of(double left, double right) { return std::sqrt(2.0 * std::min(left, right) / (left + right)); }
 
 } // namespace
 
@@ -38,13 +37,10 @@ BridgeState bridge_state(const Bridging& law, double steepest, double largest, d
 
 BridgedFaces::BridgedFaces(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const std::vector<double>& mass,
                            double most_frequency_squared)
-    : scene_(scene), body_(body), most_frequency_squared_(most_frequency_squared), still_to_share_(scene.cracks.size(), 0.0) {
-    for (const CrackLine& line : cracks.lines) length_.push_back(line.length);
-    bridges_.resize(cracks.pairs.size());
-    for (std::size_t k = 0; k < bridges_.size(); ++k) bridges_[k].freed = std::clamp(cracks.pairs[k].freed, 0.0, 1.0);
-    take_in(cracks, mass, {});
+    : scene_(scene), body_(body), most_frequency_squared_(most_frequency_squared), bridges_(cracks.pairs.size()) {
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
-        if (scene.cracks[k].faces.bridging && scene.cracks[k].faces.bridging->on_all_faces) lay_on_faces(k, cracks);
+        if (scene.cracks[k].faces.bridging && scene.cracks[k].faces.bridging->on_all_faces) bridge_notch(k, cracks, mass);
+    take_in(cracks, mass);
 }
 
 bool BridgedFaces::are_in(const Scene& scene) {
@@ -52,12 +48,14 @@ bool BridgedFaces::are_in(const Scene& scene) {
 }
 
 // Each place on the crack goes to the pairs of its cell by their shape functions.
-void BridgedFaces::lay_on_faces(int crack, const CrackFields& cracks) {
+void BridgedFaces::bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass) {
     const Layout& layout = body_.layout;
     const auto& points = cracks.lines[crack].points;
     std::multimap<int, std::size_t> at_node;
-    for (std::size_t k = 0; k < bridges_.size(); ++k)
-        if (cracks.pairs[k].crack == crack && bridges_[k].share > 0.0) at_node.emplace(cracks.pairs[k].node, k);
+    for (std::size_t k = 0; k < cracks.pairs.size(); ++k) {
+        const FieldPair& pair = cracks.pairs[k];
+        if (pair.crack == crack && mass[pair.left] > 0.0 && mass[pair.right] > 0.0) at_node.emplace(pair.node, k);
+    }
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {
         const Vec2 along = points[i + 1] - points[i];
         const int places = static_cast<int>(std::ceil(places_in_cell * along.norm() / layout.cell.minCoeff()));
@@ -67,57 +65,90 @@ void BridgedFaces::lay_on_faces(int crack, const CrackFields& cracks) {
             const int c = layout.cell_at(x);
             const auto nodes = layout.cell_nodes(c);
             const auto values = body_.values_at(c, x);
-            std::vector<std::pair<std::size_t, double>> here;  // pairs and their shares
             double sum = 0.0;
-            for (int n = 0; n < layout.nodes_per_cell(); ++n) {
+            for (int n = 0; n < layout.nodes_per_cell(); ++n) sum += values[n] * static_cast<double>(at_node.count(nodes[n]));
+            for (int n = 0; n < layout.nodes_per_cell() && sum > 0.0; ++n) {
                 const auto [first, last] = at_node.equal_range(nodes[n]);
-                for (auto pair = first; pair != last; ++pair) {
-                    here.emplace_back(pair->second, values[n]);
-                    sum += values[n];
-                }
+                for (auto pair = first; pair != last; ++pair)
+                    bridges_[pair->second].area += values[n] / sum * along.norm() / places * layout.thickness;
             }
-            for (const auto& [k, value] : here)
-                if (sum > 0.0) bridges_[k].area += value / sum * along.norm() / places * layout.thickness;
         }
     }
-    for (std::size_t k = 0; k < bridges_.size(); ++k)
-        if (bridges_[k].area > 0.0 && cracks.pairs[k].crack == crack) live_.push_back(k);
+    for (const auto& [node, k] : at_node)
+        if (bridges_[k].area > 0.0) live_.push_back(k);
 }
 
-double BridgedFaces::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement) {
-    std::vector<double> passing(cracks.lines.size(), 0.0);  // pairs by their weight
-    std::vector<double> gone(cracks.pairs.size(), 0.0);
+// Whether wood that moves with a node lies on either side of a straight crack.
+bool BridgedFaces::is_cut(int node, const Vec2& on_crack, const Vec2& along) const {
+    const Layout& layout = body_.layout;
+    bool left = false, right = false;
+    body_.for_cells_in(layout.support(node), [&](int c) {
+        const auto nodes = layout.cell_nodes(c);
+        if (std::find(nodes.begin(), nodes.begin() + layout.nodes_per_cell(), node) == nodes.begin() + layout.nodes_per_cell()) return;
+        for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p)
+            (cross(along, body_.points.position[p] - on_crack) >= 0.0 ? left : right) = true;
+    });
+    return left && right;
+}
+
+// The faces of a pair that a tip is about to free, were the crack straight about it [m^2]. As above, but pairs farther ahead are not
+// there yet.
+double BridgedFaces::area_ahead(const CrackFields& cracks, const FieldPair& pair) const {
+    const Layout& layout = body_.layout;
+    const bool at_end = TipTies::is_of(cracks, pair, pair.crack, true);
+    const Vec2& tip = cracks.lines[pair.crack].tip(at_end).position;
+    const Vec2& along = pair.along;
+    const double beside = (layout.node_position(pair.node) - tip).dot(along);
+    const double step = layout.cell.minCoeff() / places_in_cell;
+    const int reach = static_cast<int>(std::ceil((layout.degree + 1) * layout.cell.maxCoeff() / step));
+    std::map<int, bool> cut;
+    double length = 0.0;
+    for (int j = -reach; j < reach; ++j) {
+        const Vec2 x = tip + (beside + (j + 0.5) * step) * along;
+        if (body_.point_at(x) < 0) continue;
+        const int c = layout.cell_at(x);
+        const auto nodes = layout.cell_nodes(c);
+        const auto values = body_.values_at(c, x);
+        double own = 0.0, sum = 0.0;
+        for (int n = 0; n < layout.nodes_per_cell(); ++n) {
+            const auto [found, is_new] = cut.try_emplace(nodes[n], false);
+            if (is_new) found->second = is_cut(nodes[n], tip, along);
+            if (!found->second) continue;
+            sum += values[n];
+            if (nodes[n] == pair.node) own = values[n];
+        }
+        if (own > 0.0) length += own / sum * step;
+    }
+    return length * layout.thickness;
+}
+
+double BridgedFaces::softer_ties(const CrackFields& cracks, double softness) const {
+    double most = 1.0;
+    for (std::size_t k = bridges_.size(); k < cracks.pairs.size(); ++k) {
+        const FieldPair& pair = cracks.pairs[k];
+        const auto& law = scene_.cracks[pair.crack].faces.bridging;
+        if (!law || !std::isfinite(pair.compliance)) continue;
+        const double faces = pair.along.cwiseProduct(body_.layout.cell).norm() * body_.layout.thickness;
+        const double steepness = law->stress / law->opening * faces * softness * pair.compliance;
+        most = std::max(most, 1.0 / std::max(least_stiffness_left, 1.0 - steepness));
+    }
+    return most;
+}
+
+void BridgedFaces::take_in(const CrackFields& cracks, const std::vector<double>& mass) {
+    const std::size_t known = bridges_.size();
     bridges_.resize(cracks.pairs.size());
     for (std::size_t k = 0; k < bridges_.size(); ++k) {
         const FieldPair& pair = cracks.pairs[k];
         const double left = mass[pair.left], right = mass[pair.right];
-        Bridge& bridge = bridges_[k];
-        const double freed = std::clamp(pair.freed, bridge.freed, 1.0);
-        gone[k] = freed - bridge.freed;
-        bridge.freed = freed;
-        const bool is_bridged = scene_.cracks[pair.crack].faces.bridging && left > 0.0 && right > 0.0;
-        bridge.share = is_bridged ? weight_of(left, right) : 0.0;
-        bridge.stiffest = is_bridged ? freed * most_frequency_squared_ * left * right / (left + right) : 0.0;  // the rest is the tie's
-        passing[pair.crack] += bridge.share * gone[k];
+        if (!scene_.cracks[pair.crack].faces.bridging || left == 0.0 || right == 0.0) continue;
+        if (k >= known) {
+            bridges_[k].area = area_ahead(cracks, pair);
+            if (bridges_[k].area > 0.0) live_.push_back(k);
+        }
+        const double freed = std::clamp(pair.freed, 0.0, 1.0);  // the rest of the stiffness is the tie's
+        bridges_[k].stiffest = freed * most_frequency_squared_ * left * right / (left + right);
     }
-    double taken = 0.0;
-    for (std::size_t c = 0; c < cracks.lines.size(); ++c) {
-        if (!scene_.cracks[c].faces.bridging) continue;
-        still_to_share_[c] += (cracks.lines[c].length - length_[c]) * body_.layout.thickness;
-        length_[c] = cracks.lines[c].length;
-    }
-    for (std::size_t k = 0; k < bridges_.size(); ++k) {
-        const int c = cracks.pairs[k].crack;
-        const double added = gone[k] * bridges_[k].share > 0.0 ? still_to_share_[c] * gone[k] * bridges_[k].share / passing[c] : 0.0;
-        if (added == 0.0) continue;
-        if (bridges_[k].area == 0.0) live_.push_back(k);
-        bridges_[k].area += added;
-        const BridgeState now = state(cracks, k, displacement);
-        taken += added * (now.stored + now.dissipated);
-    }
-    for (std::size_t c = 0; c < passing.size(); ++c)
-        if (passing[c] > 0.0) still_to_share_[c] = 0.0;
-    return taken;
 }
 
 BridgeState BridgedFaces::state(const CrackFields& cracks, std::size_t k, const std::vector<Vec2>& displacement) const {
@@ -141,19 +172,6 @@ void BridgedFaces::pull(const CrackFields& cracks, const std::vector<Vec2>& disp
 void BridgedFaces::add_to(std::vector<Vec2>& faces, const CrackFields& cracks) const {
     faces.resize(cracks.pairs.size(), Vec2::Zero());
     for (const std::size_t k : live_) faces[k] -= bridges_[k].force * cracks.pairs[k].normal;
-}
-
-double BridgedFaces::price_of_new_faces(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement) const {
-    double sum = 0.0, weights = 0.0;
-    for (std::size_t k = 0; k < bridges_.size(); ++k) {
-        const FieldPair& pair = cracks.pairs[k];
-        const double share = bridges_[k].share;
-        if (bridges_[k].area == 0.0 || bridges_[k].freed >= 1.0 || !TipTies::is_of(cracks, pair, crack, at_end)) continue;
-        const BridgeState now = state(cracks, k, displacement);
-        sum += share * (now.stored + now.dissipated);
-        weights += share;
-    }
-    return weights > 0.0 ? sum / weights : 0.0;
 }
 
 BridgedFaces::Energies BridgedFaces::energies(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {

@@ -18,10 +18,10 @@ struct BridgeState {
 BridgeState bridge_state(const Bridging& law, double steepest, double largest, double opening);
 
 /// Bridged crack faces in motion. Each pair of fields carries the traction on a part of the crack's faces, by its own jump along the
-/// normal. New faces go to the pairs that the tip is passing as it frees them, so that bridged faces are as long as the crack has
-/// grown; as those pairs have opened already, the tip has to supply what faces that are so far open have taken.
-///
-/// Faces that have not opened are rigid: they are pulled by the whole stress of the law, and contact keeps them from closing.
+/// normal: that part of the crack's length on which its shape function stands for the jump. Faces that have not opened are rigid: the
+/// whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a tip comes to is bridged before the tip
+/// frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by the bridges. Pairs that the tip
+/// of a notch has begun to free before the start are not bridged: there growth begins at the toughness of the tip.
 class BridgedFaces {
   public:
     /// Bridges may add as much to the squared frequency of a pair that the tip has freed [1/s^2].
@@ -30,17 +30,19 @@ class BridgedFaces {
 
     static bool are_in(const Scene& scene);
 
-    /// After a tip has moved or masses have changed. Returns what the new faces have taken [J].
-    double take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement);
+    /// What the compliance of ties at the pairs that a tip has just come to must be multiplied by, beyond `softness` of TipPatch. With
+    /// c the compliance of a free pair and k the slope of its softening bridges it opens as one of 1 / c - k; the tie of CrackFields for
+    /// that one lets the energy go linearly with the tip again.
+    double softer_ties(const CrackFields& cracks, double softness) const;
+
+    /// After a tip has moved or masses have changed.
+    void take_in(const CrackFields& cracks, const std::vector<double>& mass);
 
     /// Adds the tractions to the forces of the fields [N].
     void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
 
     /// Adds the last tractions to what faces put on the left one of each pair [pairs] [N].
     void add_to(std::vector<Vec2>& faces, const CrackFields& cracks) const;
-
-    /// What new faces at a tip have taken once they are there, per area [J/m^2].
-    double price_of_new_faces(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement) const;
 
     struct Energies {
         double stored = 0, dissipated = 0;  // [J]
@@ -50,22 +52,20 @@ class BridgedFaces {
   private:
     struct Bridge {
         double area = 0;      // [m^2]
-        double share = 0;     // weight among the pairs that a tip passes
-        double freed = 0;     // by the tip so far, 0..1
         double stiffest = 0;  // [N/m]
         double largest = 0;   // opening so far [m]
         double force = 0;     // that pulled the faces together last [N]
     };
-    void lay_on_faces(int crack, const CrackFields& cracks);
+    void bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass);
+    double area_ahead(const CrackFields& cracks, const FieldPair& pair) const;
+    bool is_cut(int node, const Vec2& on_crack, const Vec2& along) const;
     BridgeState state(const CrackFields& cracks, std::size_t pair, const std::vector<Vec2>& displacement) const;
 
     const Scene& scene_;
     const Discretisation& body_;
-    double most_frequency_squared_;       // [1/s^2]
-    std::vector<Bridge> bridges_;         // [pairs]
-    std::vector<std::size_t> live_;       // of them those that have faces
-    std::vector<double> length_;          // [cracks] as last seen [m]
-    std::vector<double> still_to_share_;  // [cracks] new faces while no pair was being freed [m^2]
+    double most_frequency_squared_;   // [1/s^2]
+    std::vector<Bridge> bridges_;     // [pairs]
+    std::vector<std::size_t> live_;   // of them those that have faces
 };
 
 } // namespace crampfit

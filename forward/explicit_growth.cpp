@@ -47,10 +47,9 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
 
     TipTies::Advance next{0.0, 0.0};
-    const double bridging = bridges_ ? bridges_->price_of_new_faces(cracks_, crack, at_end, displacement_) : 0.0;
     if (ties_.holds(cracks_, crack, at_end))
-        next = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness) + bridging,
-                                  state.allowed, displacement_, velocity_, plan_.time_step);
+        next = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed,
+                                  displacement_, velocity_, plan_.time_step);
     else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides, at no cost
         next.way = std::min(state.allowed, leg_in_cells * cell);
     const double way = next.way;
@@ -79,7 +78,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
             materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
-    if (bridges_) books_.fracture -= bridges_->take_in(cracks_, mass_, displacement_);  // it is in the books of the faces
+    if (bridges_) bridges_->take_in(cracks_, mass_);
 }
 
 TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {

@@ -92,6 +92,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     list_held();
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
+    if (bridges_) softness *= bridges_->softer_ties(cracks_, softness);
     ties_.take_in(cracks_, mass_, displacement_, false, softness);
 }
 

@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "forward/bridging.hpp"
+#include "forward/bridging_check.hpp"
 #include "forward/history.hpp"
 #include "forward/march.hpp"
 #include "forward/memory_check.hpp"
@@ -77,10 +78,6 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
         const Crack& crack = scene.cracks[k];
         const std::string key = "cracks." + std::to_string(k);
-        if (quasistatic && crack.faces.bridging)
-            refuse(scene, key + ".faces.traction", fmt::format("{:g} MPa", crack.faces.bridging->stress * 1e-6),
-                   "not available at equilibrium, where the energy that an advance releases is taken from the two ends of it: faces that soften "
-                   "take some on the way; use solver.kind = \"explicit\", and a load that does not take long");
         if (crack.direction == GrowthDirection::energy_release_rate && crack.grows != Growth::none && orthotropic)
             refuse(scene, key + ".direction", "energy release rate",
                    "not available in orthotropic wood, for whose branches no solution is built in; use \"hoop stress\", \"normal to opening\" or \"straight\"");
@@ -241,22 +238,6 @@ void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials
                             "external work = strain + kinetic + fracture energy + what wood, damping and friction dissipate"});
 }
 
-// A zone of bridged faces is about as long as E' times the energy over the stress squared (Hillerborg, Modeer and Petersson 1976).
-void choose_bridging(const Scene& scene, Plan& plan, const Discretisation& body) {
-    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
-        const auto& law = scene.cracks[k].faces.bridging;
-        if (!law) continue;
-        double softest = std::numeric_limits<double>::infinity();
-        for (int p = 0; p < body.points.count(); ++p) softest = std::min(softest, body.points.stiffest(p));
-        const double cells = softest * law->energy() / (law->stress * law->stress) / body.layout.cell.maxCoeff();
-        plan.choices.push_back({fmt::format("bridging of {}", k),
-                                fmt::format("{} MPa falling to nothing at {} mm, {:.4g} J/m^2 beyond the toughness of the tip, on {} faces",
-                                            law->stress * 1e-6, law->opening * 1e3, law->energy(), law->on_all_faces ? "all" : "new"),
-                                fmt::format("asked for in cracks.{}.faces.traction; softens over about {:.2g} cells{}; G and K are those of the tip", k, cells,
-                                            cells < 3.0 ? ": fewer than 3, where the course of the force hangs on the cell" : "")});
-    }
-}
-
 } // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -288,6 +269,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     plan.remembers = materials.remembers();
     check_memory(scene, plan.quasistatic, materials, body);
+    check_bridging(scene, plan.quasistatic, materials, body);
 
     const double smallest = scene.specimen.size.minCoeff();
     const double motion = farthest_motion(scene, plan.end_time);
@@ -362,7 +344,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;
 
-    choose_bridging(scene, plan, body);
+    for (const Plan::Choice& choice : bridging_choices(scene, materials, body)) plan.choices.push_back(choice);
     const double highest = highest_frequency_squared(body);
     plan.added_frequency_squared = plan.contact || parts_touch || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);
