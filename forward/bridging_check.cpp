@@ -12,8 +12,8 @@ namespace crampfit {
 
 namespace {
 
-// In a strip whose crack grows at a given G the bridges take their energy to 1 % with 11 cells in the length below, to 5 to 9 % with 6
-// (`VerificationBridging.GrowsAtTheEnergyOfTipAndBridges` has the figures); with 3 a tip stops between pairs of nodes.
+// A crack that grows through a strip takes the energy of its bridges to 3 % with 7 to 22 cells in the length below, 5 to 9 % too much with
+// 6, and several times as much with 3 (the scene of `VerificationBridging.GrowsAtTheEnergyOfTipAndBridges`).
 constexpr double least_cells = 7.0;
 
 // E' times the energy over the stress squared, by which faces soften along a crack (Hillerborg, Modeer and Petersson 1976), in the
