@@ -47,7 +47,8 @@ bool BridgedFaces::are_in(const Scene& scene) {
     return std::any_of(scene.cracks.begin(), scene.cracks.end(), [](const Crack& crack) { return crack.faces.bridging.has_value(); });
 }
 
-// Each place on the crack goes to the pairs of its cell by their shape functions.
+// Each place on the crack goes to the pairs of its cell by their shape functions; a pair that the tip has begun to free is bridged as a
+// whole, as those are that it comes to later.
 void BridgedFaces::bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass) {
     const Layout& layout = body_.layout;
     const auto& points = cracks.lines[crack].points;
@@ -74,8 +75,10 @@ void BridgedFaces::bridge_notch(int crack, const CrackFields& cracks, const std:
             }
         }
     }
-    for (const auto& [node, k] : at_node)
+    for (const auto& [node, k] : at_node) {
+        if (cracks.pairs[k].freed < 1.0) bridges_[k].area = area_ahead(cracks, cracks.pairs[k]);
         if (bridges_[k].area > 0.0) live_.push_back(k);
+    }
 }
 
 // Whether wood that moves with a node lies on either side of a straight crack.

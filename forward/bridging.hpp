@@ -20,8 +20,8 @@ BridgeState bridge_state(const Bridging& law, double steepest, double largest, d
 /// Bridged crack faces in motion. Each pair of fields carries the traction on a part of the crack's faces, by its own jump along the
 /// normal: that part of the crack's length on which its shape function stands for the jump. Faces that have not opened are rigid: the
 /// whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a tip comes to is bridged before the tip
-/// frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by the bridges. Pairs that the tip
-/// of a notch has begun to free before the start are not bridged: there growth begins at the toughness of the tip.
+/// frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by the bridges. Where the faces of
+/// the start are not bridged nor are pairs that the tip has begun to free by then: growth begins at the toughness of the tip.
 class BridgedFaces {
   public:
     /// Bridges may add as much to the squared frequency of a pair that the tip has freed [1/s^2].

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <initializer_list>
+#include <utility>
 
 namespace crampfit::test {
 namespace {
@@ -127,6 +128,29 @@ Scene strip(double cell, double lift, double speed, std::optional<Bridging> law)
     scene.solver.damping = 2e4;
     scene.stop.crack_length = 5.8e-3;  // the faces at the notch are free again by then
     return scene;
+}
+
+TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
+    // Rice (1968): of G far away a zone of bridges that are all broken at its far end takes the energy of the law. The zone is about 8
+    // cells long; wherever in a cell the tip lies, and the crack.
+    const double u = 82e-6, speed = 0.1, half_height = 4e-3, cell = 0.2e-3;
+    const double far = 40e6 * (1 - 0.33) / (1.33 * 0.34) * u * u / half_height;
+    const Bridging law{0.5e6, 0.15e-3, true};
+    for (const auto& [tip, lift] : {std::pair{16.03e-3, 0.0}, {16.1e-3, 0.3}, {15.95e-3, 0.5}}) {
+        Scene scene = strip(cell, 0.0, speed, law);
+        scene.specimen.size = {32e-3, 2 * half_height};
+        for (Edge& edge : scene.edges) edge.until = u / speed;
+        scene.cracks[0].points = {Vec2(0, half_height + lift * cell), Vec2(tip, half_height + lift * cell)};
+        scene.cracks[0].grows = Growth::none;
+        scene.solver.damping = 3e4;
+        scene.stop = {};
+        scene.stop.time = 1.3e-3;
+        const Instant end = simulate(scene).series.back();
+        std::printf("tip at %.2f mm, crack %.1f of a cell up: G off by %+.2f %%, K_I^2 / E' by %+.2f %% of that far away\n", 1e3 * tip, lift,
+                    100 * (end.G - far + law.energy()) / far, 100 * (end.K_I * end.K_I / plane_modulus() - far + law.energy()) / far);
+        EXPECT_NEAR(end.G, far - law.energy(), 0.03 * far);
+        EXPECT_NEAR(end.K_I * end.K_I / plane_modulus(), far - law.energy(), 0.03 * far);
+    }
 }
 
 struct Growing {
