@@ -58,6 +58,8 @@ inline constexpr NumberRule traction = finite(dimension::pressure);
 inline constexpr NumberRule force = finite(dimension::force);
 inline constexpr NumberRule until = positive(dimension::time);
 inline constexpr NumberRule friction = not_negative(dimension::number);
+inline constexpr NumberRule bridging_stress = positive(dimension::pressure);
+inline constexpr NumberRule bridging_opening = positive(dimension::length);
 inline constexpr NumberRule advance = not_negative(dimension::length);
 inline constexpr NumberRule share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
 inline constexpr NumberRule compliance = not_negative(dimension::compliance);

@@ -132,6 +132,10 @@ class NumberFinder {
         if (number == scene_.cracks.size()) {
             fail(fmt::format(": there is no crack {}; cracks are numbered from 0", part(1)));
         }
+        if (const auto& bridging = scene_.cracks[number].faces.bridging; bridging && part(2) == "faces" && part(3) == "traction") {
+            return member({{"stress", {&bridging->stress, limits::bridging_stress}},
+                           {"opening", {&bridging->opening, limits::bridging_opening}}}, 4);
+        }
         if (part(2) == "faces") {
             return friction(scene_.cracks[number].faces, CrackFaces::Kind::friction);
         }

@@ -193,9 +193,21 @@ struct Body {
 enum class Growth { none, start, end, both };
 enum class GrowthDirection { normal_to_opening, hoop_stress, energy_release_rate, straight };
 
+/// What still pulls open faces together, along the crack's normal (fibre bridging, process zone; linear softening after Hillerborg,
+/// Modeer and Petersson 1976): `stress` (1 - d / `opening`) at the largest opening d so far, nothing from `opening` on. Where they close
+/// again it falls in proportion to the opening.
+struct Bridging {
+    double stress = 0.0;       // of faces that begin to open [Pa]
+    double opening = 0.0;      // at which it ends [m]
+    bool on_all_faces = false; // also on those that the crack has at the start; else where it grows
+
+    double energy() const { return 0.5 * stress * opening; }  // that it takes in all [J/m^2]
+};
+
 struct CrackFaces {
     enum class Kind { frictionless, stick, friction } kind = Kind::frictionless;
     double coefficient = 0.0;
+    std::optional<Bridging> bridging = {};
 };
 
 struct Crack {

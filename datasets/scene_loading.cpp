@@ -140,6 +140,30 @@ std::vector<Vec2> read_crack_points(const Entry& entry, const Vec2& specimen_siz
     return points;
 }
 
+Bridging read_bridging(const Entry& entry) {
+    entry.only({"stress", "opening", "on"});
+    Bridging bridging{entry.at("stress").number(limits::bridging_stress), entry.at("opening").number(limits::bridging_opening)};
+    if (const auto on = entry.find("on")) {
+        bridging.on_all_faces = on->choice<bool>({{"new faces", false}, {"all faces", true}});
+    }
+    return bridging;
+}
+
+CrackFaces read_faces(const Entry& entry) {
+    if (entry.is_table()) {
+        entry.only({"friction", "traction"});
+    }
+    if (!entry.is_table() || !entry.has("traction")) {
+        return read_meeting<CrackFaces>(entry, {{"frictionless", CrackFaces::Kind::frictionless}, {"stick", CrackFaces::Kind::stick}});
+    }
+    if (entry.has("friction")) {
+        entry.fail("give one of friction and traction: faces that a traction pulls together do not rub");
+    }
+    CrackFaces faces;
+    faces.bridging = read_bridging(entry.at("traction"));
+    return faces;
+}
+
 Crack read_crack(const Entry& entry, const Vec2& specimen_size) {
     entry.only({"points", "grows", "criterion", "advance", "direction", "faces"});
     Crack crack;
@@ -162,8 +186,10 @@ Crack read_crack(const Entry& entry, const Vec2& specimen_size) {
                                                 {"straight", GrowthDirection::straight}});
     }
     if (const auto faces = entry.find("faces")) {
-        crack.faces = read_meeting<CrackFaces>(
-            *faces, {{"frictionless", CrackFaces::Kind::frictionless}, {"stick", CrackFaces::Kind::stick}});
+        crack.faces = read_faces(*faces);
+        if (crack.faces.bridging && !crack.faces.bridging->on_all_faces && crack.grows == Growth::none) {
+            faces->at("traction").fail("acts where the crack grows, and this one does not: give on = \"all faces\", or let it grow");
+        }
     }
     return crack;
 }

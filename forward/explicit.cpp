@@ -30,6 +30,7 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     tips_.resize(2 * cracks_.lines.size());
     mass_ = field_masses(body, cracks_.fields());
     ties_.take_in(cracks_, mass_, displacement_, true);
+    if (BridgedFaces::are_in(scene)) bridges_.emplace(scene, body, cracks_, mass_, plan.added_frequency_squared);
     for (const Boundary::Held& h : boundary_.held) {
         velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
         books_.work += 0.5 * mass_[h.field] * velocity_[h.field][h.axis] * velocity_[h.field][h.axis];
@@ -57,6 +58,7 @@ void ExplicitSolver::step() {
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
     inner_forces(time_ + (0.5 - lag()) * plan_.time_step);
     surface_forces();
+    if (bridges_) bridges_->pull(cracks_, displacement_, force_);
     ties_.settle(cracks_, mass_, force_);
     ties_.pull(cracks_, displacement_, force_);
     advance_velocities();
@@ -182,7 +184,9 @@ void ExplicitSolver::advance_displacements(double share) {
 TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     EnergyReleaseOptions options;
     options.rotates = plan_.rotates;
-    TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, face_force_}, options);
+    std::vector<Vec2> faces = face_force_;
+    if (bridges_) bridges_->add_to(faces, cracks_);
+    TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, faces}, options);
     if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
     return load;
 }
@@ -196,6 +200,11 @@ EnergyBooks ExplicitSolver::energies() const {
     for (std::size_t n = 0; n < there.size(); ++n) there[n] -= since * velocity_[n];
     books.strain = internal_force_.energy(there) + ties_.energy(cracks_, there);
     books.kinetic = kinetic_energy();
+    if (bridges_) {
+        const BridgedFaces::Energies faces = bridges_->energies(cracks_, there);
+        books.strain += faces.stored;
+        books.fracture += faces.dissipated;
+    }
     for (const SlidingBody& body : sliding_) books.contact += body.stored_energy();
     for (const SlidingBody& body : sliding_) books.damped += body.dissipated();
     if (history_) books.damped += history_->dissipated();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/boundary.hpp"
+#include "forward/bridging.hpp"
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
 #include "forward/internal_force.hpp"
@@ -21,10 +22,11 @@ namespace crampfit {
 /// Energies of a run so far [J]. In a perfect run work = strain + kinetic + contact + fracture + damped.
 struct EnergyBooks {
     double work = 0;      // done by edges and bodies
-    double strain = 0;    // in the points, and in the ties at a crack tip
+    double strain = 0;    // in the points, in the ties at a crack tip and in bridged faces
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
-    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back
+    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back;
+                          // and bridged faces
     double damped = 0;    // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
@@ -108,6 +110,7 @@ class ExplicitSolver {
     InternalForce internal_force_;
     mutable Team team_;
     TipTies ties_;
+    std::optional<BridgedFaces> bridges_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
     std::optional<PartContact> part_contact_;

@@ -78,6 +78,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
             materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
+    if (bridges_) bridges_->take_in(cracks_, mass_);
 }
 
 TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {

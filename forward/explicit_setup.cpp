@@ -77,7 +77,7 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     if (mapping_.is_used() && !mapping_.nodes_carry()) mapping_.hand_back(velocity_, {mass_, held_axes_, team_});
     books_ = {};
     const EnergyBooks at_start = energies();
-    books_.work = at_start.strain + at_start.kinetic + at_start.damped;
+    books_.work = at_start.strain + at_start.kinetic + at_start.damped + at_start.fracture;
 }
 
 void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {
@@ -92,6 +92,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     list_held();
     mass_ = field_masses(body_, cracks_.fields());
     internal_force_.sort_cells();
+    if (bridges_) softness *= bridges_->softer_ties(cracks_, softness);
     ties_.take_in(cracks_, mass_, displacement_, false, softness);
 }
 

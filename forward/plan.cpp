@@ -1,6 +1,8 @@
 #include "forward/plan.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/bridging.hpp"
+#include "forward/bridging_check.hpp"
 #include "forward/history.hpp"
 #include "forward/march.hpp"
 #include "forward/memory_check.hpp"
@@ -256,16 +258,18 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.still_from = travel.until;
     for (const Crack& crack : scene.cracks) plan.grows |= crack.grows != Growth::none;
     for (const Crack& crack : scene.cracks) plan.friction |= crack.faces.coefficient > 0.0;
+    const bool bridged = BridgedFaces::are_in(scene);
     for (const Body& rigid : scene.bodies) {
         plan.friction |= rigid.contact.coefficient > 0.0;
         plan.free_bodies |= rigid.free[0] || rigid.free[1];
     }
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
+                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) && !bridged &&
                         (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     plan.remembers = materials.remembers();
     check_memory(scene, plan.quasistatic, materials, body);
+    check_bridging(scene, plan.quasistatic, materials, body);
 
     const double smallest = scene.specimen.size.minCoeff();
     const double motion = farthest_motion(scene, plan.end_time);
@@ -281,6 +285,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                                     "the load may go");
     const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
+        : bridged ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
         : starts_in_motion(scene) ? "a part starts in motion"
         : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
     if (plan.quasistatic)
@@ -342,6 +347,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;
 
+    for (const Plan::Choice& choice : bridging_choices(scene, materials, body)) plan.choices.push_back(choice);
     const double highest = highest_frequency_squared(body);
     plan.added_frequency_squared = plan.contact || parts_touch || !scene.cracks.empty() ? added_stiffness * highest : 0.0;
     plan.time_step = courant * 2.0 / std::sqrt(highest + plan.added_frequency_squared);

@@ -91,7 +91,7 @@ double TipTies::energy(const CrackFields& cracks, const std::vector<Vec2>& displ
     return sum;
 }
 
-bool TipTies::is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end) const {
+bool TipTies::is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end) {
     if (pair.crack != crack) return false;
     const CrackLine& line = cracks.lines[crack];
     const bool ends = (pair.freed_at - line.end.position).squaredNorm() <= (pair.freed_at - line.start.position).squaredNorm();

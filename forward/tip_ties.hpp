@@ -47,6 +47,8 @@ class TipTies {
     Advance balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
                          const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const;
 
+    /// Whether it is this tip that frees the pair.
+    static bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end);
     bool holds(const CrackFields& cracks, int crack, bool at_end) const;
 
   private:
@@ -61,8 +63,6 @@ class TipTies {
     double share(const Tie& tie, double freed) const;
     double stiffness(const Tie& tie, double f) const;
     double width(const CrackTip& tip) const;
-    bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end) const;
-
     Vec2 cell_;                       // [m]
     double thickness_;                // [m]
     double most_frequency_squared_;   // [1/s^2]

@@ -603,3 +603,37 @@ TEST(UnitScene, ABodyMayFollowAForce) {
         {ring_scene, free, "velocity = [\"0 m/s\", \"free\"]\nforce = [\"0 N\", \"3\"]", "bodies.left wheel.force.1", ""},
     });
 }
+
+TEST(UnitScene, FacesThatATractionPullsTogether) {
+    const std::string rub = "faces = { friction = 0.2 }";
+    const std::string good = "faces = { traction = { stress = \"2 MPa\", opening = \"0.1 mm\" } }";
+    const std::string text = replaced(ring_scene, rub, good);
+    Scene scene = SceneFolder().parse(text);
+    ASSERT_TRUE(scene.cracks[0].faces.bridging);
+    EXPECT_EQ(scene.cracks[0].faces.kind, CrackFaces::Kind::frictionless);
+    EXPECT_DOUBLE_EQ(scene.cracks[0].faces.bridging->stress, 2e6);
+    EXPECT_DOUBLE_EQ(scene.cracks[0].faces.bridging->opening, 1e-4);
+    EXPECT_FALSE(scene.cracks[0].faces.bridging->on_all_faces);
+    EXPECT_FALSE(scene.cracks[1].faces.bridging);
+    EXPECT_TRUE(SceneFolder().parse(replaced(text, "\"0.1 mm\" } }", "\"0.1 mm\", on = \"all faces\" } }")).cracks[0].faces.bridging->on_all_faces);
+    set_number(scene, "cracks.0.faces.traction.stress", 3e6);
+    EXPECT_EQ(scene.cracks[0].faces.bridging->stress, 3e6);
+    EXPECT_THROW(set_number(scene, "cracks.0.faces.traction.opening", 0.0), InputError);
+    EXPECT_THROW(set_number(scene, "cracks.0.faces.friction", 0.1), InputError);
+    EXPECT_THROW(set_number(scene, "cracks.1.faces.traction.stress", 1e6), InputError);
+    const std::string key = "cracks.0.faces.traction";
+    expect_errors({
+        {text, "\"2 MPa\"", "\"-2 MPa\"", key + ".stress", "greater than 0"},
+        {text, "\"2 MPa\"", "\"0 MPa\"", key + ".stress", "greater than 0"},
+        {text, "\"2 MPa\"", "2", key + ".stress", "unit"},
+        {text, "\"2 MPa\"", "\"2 mm\"", key + ".stress", "pressure"},
+        {text, "stress = \"2 MPa\", ", "", key + ".stress", "missing"},
+        {text, "\"0.1 mm\" } }", "\"0 mm\" } }", key + ".opening", "greater than 0"},
+        {text, ", opening = \"0.1 mm\"", "", key + ".opening", "missing"},
+        {text, "opening =", "openning =", key + ".openning", "did you mean \"opening\"?"},
+        {text, "\"0.1 mm\" } }", "\"0.1 mm\", on = \"old faces\" } }", key + ".on", "new faces"},
+        {text, "traction = { stress", "tration = { stress", "cracks.0.faces.tration", "did you mean \"traction\"?"},
+        {text, "{ traction =", "{ friction = 0.2, traction =", "cracks.0.faces", "one of friction and traction"},
+        {text, "grows = \"end\"", "grows = \"none\"", key, "all faces"},
+    });
+}
