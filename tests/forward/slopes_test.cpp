@@ -174,7 +174,7 @@ TEST(GradientRecord, OfAWedgeTest) {
 }
 
 // Displacements in the wood, on either side of the crack and ahead of it.
-void check_probes(const char* name, Scene scene, double step, const std::vector<std::string>& keys) {
+void check_probes(const char* name, Scene scene, double step, double tolerance, const std::vector<std::string>& keys) {
     scene.output.probes = {{{1e-3, 7e-3}, {1.3e-3, 3.1e-3}, {4e-3, 8e-3}, {6e-3, 2e-3}, {8.9e-3, 5.2e-3}}, {}, true};
     for (const double share : {0.2, 0.7, 0.95}) scene.output.probes.instants.push_back(share * *scene.stop.displacement);
     KeptWalk walk(scene, numbers);
@@ -200,15 +200,16 @@ void check_probes(const char* name, Scene scene, double step, const std::vector<
                 largest = std::max(largest, difference.norm());
             }
         std::printf("%s, probes by %s: %.1e of %.2e m\n", name, key.c_str(), worst / largest, largest);
-        EXPECT_LT(worst, 1e-5 * largest) << key;
+        EXPECT_LT(worst, tolerance * largest) << key;
     }
 }
 
 TEST(GradientRecord, ProbesMoveWithTheNumbers) {
     std::vector<std::string> keys = numbers;
     keys.insert(keys.end(), {"materials.EW.toughness", "materials.LW.toughness"});
-    check_probes("linear", across_rings(0.4e-3), 1e-4, keys);
-    check_probes("wedge", wedge_across_rings(0.5e-3), 5e-4, keys);  // what Newton's method leaves counts in a smaller step
+    check_probes("linear", across_rings(0.4e-3), 1e-4, 1e-5, keys);
+    // Newton's method leaves 2e-11 m in each slope: of that by latewood's nu, which is small, 1.3e-5.
+    check_probes("wedge", wedge_across_rings(0.5e-3), 5e-4, 2e-5, keys);
 }
 
 TEST(GradientRecord, TractionMovesItsEdge) {
