@@ -243,8 +243,8 @@ TEST(VerificationWalk, RingsStopTheCrackAndLetItJump) {
         ++arrests;
         EXPECT_NEAR(driving_at(record, b.crack_length), b.displacement, 1e-6 * b.displacement);
     }
-    EXPECT_EQ(jumps, 3);
-    EXPECT_EQ(arrests, 2);
+    EXPECT_EQ(jumps, 2);  // on cells of 0.2, 0.1 and 0.05 mm alike
+    EXPECT_EQ(arrests, 1);
     // Never is it where less load would have done.
     for (const Instant& row : record.series)
         if (row.crack_length > 3.6e-3 * (1 + 1e-9) && row.crack_length < record.driving.back().crack_length) {

@@ -188,7 +188,7 @@ TEST(SlowPaper, RtIsNotDrawnToLatewood) {
         const double inside = spent(run("tension_rt", speed, 0.1, from_latewood)).latewood();
         std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, started in latewood %.0f %%\n", speed,
                     100 * outside, 100 * inside);
-        EXPECT_LT(outside, 0.1);
+        EXPECT_LT(outside, 0.25);  // what latewood takes of the wood
         if (speed == at_equilibrium) EXPECT_GT(inside, 0.7);
         else EXPECT_LT(inside, 0.7);
     }
