@@ -1,8 +1,6 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
-#include "forward/geometry.hpp"
-#include "forward/probes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -141,132 +139,6 @@ LoadState Quasistatic::nothing(double time) const {
 void Quasistatic::keep(std::size_t number, int time, LoadState state) {
     if (coarse_) extrapolate(state, coarse_->walk.places_[number].states.at(time));
     places_[number].states[time] = places_[number].station.states[time] = std::move(state);
-}
-
-// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know next to
-// nothing.
-void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& coarse) const {
-    constexpr double beside = 2.0;  // [wide cells]
-    const double reach = beside * coarse_->walk.body_.layout.cell.maxCoeff();
-    const Probes& asked = scene_.output.probes;
-    const std::size_t group = asked.weights.size();
-    for (std::size_t i = 0; i < probes.size() && !coarse.empty(); ++i) {
-        bool far = coarse[i].allFinite();
-        for (std::size_t k = i * group; k < (i + 1) * group && far; ++k)
-            for (const CrackLine& line : equilibrium_.cracks().lines) far = far && distance_to(line.points, asked.places[k]) > reach;
-        if (far) probes[i] += (probes[i] - coarse[i]) / 3.0;
-    }
-}
-
-// Keeps what the scene's probes read where the equilibrium stands.
-void Quasistatic::keep_probes(std::size_t number, int time) {
-    if (scene_.output.probes.places.empty()) return;
-    std::vector<Vec2>& kept = places_[number].probes[time];
-    kept = read_probes(scene_.output.probes, body_, equilibrium_.cracks(), {&equilibrium_.displacements()}).front();
-    if (coarse_) take_off_grid_error(kept, coarse_->walk.places_[number].probes[time]);
-}
-
-void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
-    for (std::size_t n = 0; coarse_ && n < slopes.states.size(); ++n) {
-        const Slopes& coarse = coarse_->walk.places_[number].slopes.at(time);
-        extrapolate(slopes.states[n], coarse.states[n]);
-        if (!slopes.probes.empty() && !coarse.probes.empty()) take_off_grid_error(slopes.probes[n], coarse.probes[n]);
-    }
-    places_[number].slopes[time] = std::move(slopes);
-    if (!shift_.empty()) show_shifted(number, time);
-}
-
-// Derivatives of the state where the equilibrium stands. What is prescribed has none.
-std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
-    const Boundary& boundary = equilibrium_.boundary();
-    const Gauges gauges(scene_);
-    std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
-    for (int d = 0; d < boundary.drivers(); ++d)
-        if (equilibrium_.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
-    drives[1][gauges.force] = gauges.force_direction;
-    std::vector<Equilibrium::Motion> motions = equilibrium_.motions(drives);
-    if (motions.empty()) return std::nullopt;
-    const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
-    if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
-    const Equilibrium::Slopes slope = equilibrium_.slopes(numbers_);
-    std::vector<LoadState> found(numbers_.size());
-    for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
-        found[n].potential = slope.potential[n];
-        found[n].power = slope.along(motions[0], n);
-        found[n].reactions.assign(boundary.drivers(), Vec2::Zero());
-        found[n].reactions[gauges.force] = slope.along(motions[1], n) * gauges.force_direction;
-        if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
-        found[n].tips.resize(2 * scene_.cracks.size());
-    }
-    if (const MissedEnergy energy = missed(number_keys_); !energy.by_number.empty()) {
-        std::vector<Vec2> load = energy.by_displacement;
-        for (Vec2& f : load) f *= -1.0;
-        const Equilibrium::Motion yielding = equilibrium_.yield_to(load);
-        const double potential = equilibrium_.potential(), ratio = 1.0 + energy.energy / potential;
-        for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
-            const double more = energy.by_number[n] + slope.along(yielding, n);
-            if (!boundary.has_dead_load()) {
-                const double ratio_slope = (more - energy.energy * found[n].potential / potential) / potential;
-                found[n].power = ratio * found[n].power + ratio_slope * equilibrium_.power();
-                found[n].reactions[gauges.force] = ratio * found[n].reactions[gauges.force] +
-                    ratio_slope * equilibrium_.reactions()[gauges.force].dot(gauges.force_direction) * gauges.force_direction;
-            }
-            found[n].potential += more;
-        }
-    }
-    std::vector<std::vector<Vec2>> moved;
-    Slopes all;
-    if (!scene_.output.probes.places.empty()) {
-        moved = equilibrium_.displacement_slopes(slope);
-        std::vector<const std::vector<Vec2>*> each;
-        for (const std::vector<Vec2>& of_number : moved) each.push_back(&of_number);
-        all.probes = read_probes(scene_.output.probes, body_, equilibrium_.cracks(), each);
-    }
-    // A tip's own G counts where that says when it moves.
-    for (const GrowingTip& tip : growing_) {
-        if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
-        if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
-        for (std::size_t n = 0; n < numbers_.size(); ++n)
-            found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
-    }
-    all.states = std::move(found);
-    return all;
-}
-
-// Puts what the shift makes of a state in its place. To first order; as powers of the numbers, which is exact where all the wood
-// becomes stiffer by the same factor, and where a value would change too much for that, linearly.
-void Quasistatic::show_shifted(std::size_t number, int time) {
-    constexpr double most = 2.0;  // change of the logarithm
-    Place& place = places_[number];
-    LoadState state = place.states.at(time);
-    const std::vector<LoadState>& slopes = place.slopes.at(time).states;
-    const auto move = [&](double& value, auto slope_of) {
-        double change = 0.0;
-        for (std::size_t n = 0; n < shift_.size(); ++n) change += shift_[n] * slope_of(slopes[n]);
-        if (std::abs(change) <= most * std::abs(value)) value *= std::exp(value != 0.0 ? change / value : 0.0);
-        else value += change;
-    };
-    move(state.potential, [](const LoadState& s) { return s.potential; });
-    move(state.power, [](const LoadState& s) { return s.power; });
-    move(state.displacement, [](const LoadState& s) { return s.displacement; });
-    for (std::size_t d = 0; d < state.reactions.size(); ++d)
-        for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
-    for (std::size_t k = 0; k < state.tips.size(); ++k) move(state.tips[k].G, [&](const LoadState& s) { return s.tips[k].G; });
-    place.station.states[time] = std::move(state);
-}
-
-void Quasistatic::shift(const std::vector<double>& by) {
-    const std::vector<double> before = shift_;
-    shift_ = std::any_of(by.begin(), by.end(), [](double d) { return d != 0.0; }) ? by : std::vector<double>{};
-    if (shift_ == before) return;
-    for (Place& place : places_) {
-        place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
-        place.guessed.clear();
-        place.station.ahead.clear();
-    }
-    if (shift_.empty()) return;
-    for (std::size_t number = 0; number < places_.size(); ++number)
-        for (const auto& [time, slopes] : places_[number].slopes) show_shifted(number, time);
 }
 
 // Solves for something on both grids; whether it succeeded on the second, and on this one.
@@ -462,23 +334,6 @@ void Quasistatic::forget_guesses() {
     }
 }
 
-bool Quasistatic::know_slopes(std::size_t number, int time) {
-    Place& place = places_[number];
-    if (place.slopes.count(time)) return true;
-    if (coarse_ && !coarse_->walk.know_slopes(number, time)) return false;
-    Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};  // of what carries nothing
-    const auto known = place.known.find(time);
-    if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
-        enter(place);
-        equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
-        auto here = slopes_here();
-        if (!here) return false;
-        slopes = std::move(*here);
-    }
-    keep_slopes(number, time, std::move(slopes));
-    return true;
-}
-
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
@@ -522,31 +377,6 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
         if (!know(number, low) || !know(number, low + 1)) fail();
     }
     return station.states.empty() ? nothing(time) : station.at(time);
-}
-
-std::vector<Vec2> Quasistatic::probes_at(std::size_t station_number, double time) {
-    at(station_number, time);  // finds what lies about it
-    const int number = way_[station_number];
-    Place& place = places_[number];
-    if (place.probes.empty()) return {};
-    // Without an equilibrium before it nothing has moved when the load begins; a rough walk may know none after it.
-    const double t = std::min(time, plan_.still_from);
-    auto after = place.probes.lower_bound(plan_.linear ? last_time_ : std::min(static_cast<int>(t / time_step_) + 1, last_time_));
-    if (after == place.probes.end()) --after;
-    const bool first = after == place.probes.begin();
-    const double from = first ? 0.0 : time_of(std::prev(after)->first);
-    const double share = (t - from) / (time_of(after->first) - from);
-    std::vector<Vec2> found(after->second.size(), Vec2::Zero());
-    const auto add = [&](const std::pair<const int, std::vector<Vec2>>& known, double weight) {
-        for (std::size_t i = 0; i < found.size(); ++i) found[i] += weight * known.second[i];
-        if (shift_.empty() || weight == 0.0 || !know_slopes(number, known.first)) return;
-        const auto& slopes = place.slopes.at(known.first).probes;
-        for (std::size_t n = 0; n < slopes.size(); ++n)
-            for (std::size_t i = 0; i < found.size(); ++i) found[i] += weight * shift_[n] * slopes[n][i];
-    };
-    add(*after, share);
-    if (!first) add(*std::prev(after), 1.0 - share);
-    return found;
 }
 
 } // namespace crampfit

@@ -134,7 +134,7 @@ class Quasistatic {
     void keep(std::size_t number, int time, LoadState state);
     void keep_probes(std::size_t number, int time);
     void keep_slopes(std::size_t number, int time, Slopes slopes);
-    void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& coarse) const;
+    void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
     std::optional<Slopes> slopes_here();
     void show_shifted(std::size_t number, int time);
