@@ -63,12 +63,6 @@ TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
-TEST(SlowVirtualWedges, TheRightDirectionCriterionIsRankedFirst) {
-    Command command;
-    const std::string told = virtual_wedges(command, "--scene inclined --seed 5 --count 2");
-    EXPECT_EQ(after(told, "right direction criterion ranked first: "), 2);
-}
-
 // Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is said to
 // lack something.
 TEST(SlowVirtualWedges, WhatTheModelLacksIsSaid) {

@@ -1,0 +1,78 @@
+#include "forward/simulate.hpp"
+#include "inverse/kept_walks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace crampfit::testing {
+namespace {
+
+// A plate drawn apart whose rings lie at an angle to the crack.
+Scene across_inclined_rings(GrowthDirection direction) {
+    Scene scene;
+    scene.model = {.plane = PlaneCondition::strain, .thickness = 10e-3, .cell = 0.4e-3};
+    scene.specimen.size = {10e-3, 8e-3};
+    scene.specimen.rings = Rings{Vec2(-16e-3, -14e-3), 2.6e-3, 0.3, 0.4e-3};
+    scene.materials["EW"] = {400e6, 0.33, 300, 100};
+    scene.materials["LW"] = {4000e6, 0.33, 750, 100};
+    scene.edges = {{"top", Side::top, {}, {0.0, 1e-5}, {}, {}}, {"bottom", Side::bottom, {}, {0.0, 0.0}, {}, {}}};
+    Crack crack;
+    crack.points = {Vec2(0, 4.1e-3), Vec2(2e-3, 4.1e-3)};
+    crack.grows = Growth::end;
+    crack.advance = 0.8e-3;
+    crack.direction = direction;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.stop.displacement = 0.5e-3;
+    scene.stop.crack_length = 5e-3;
+    return scene;
+}
+
+Study toughness_study(const Scene& scene) {
+    Study study;
+    study.experiments.emplace_back().scene = scene;
+    for (const char* wood : {"EW", "LW"}) {
+        Parameter parameter;
+        parameter.keys = {std::string("materials.") + wood + ".toughness"};
+        parameter.initial = 100;
+        parameter.lower = 20;
+        parameter.upper = 800;
+        study.parameters.push_back(parameter);
+    }
+    return study;
+}
+
+double apart(const Record& a, const Record& b) {
+    double most = 0;
+    for (std::size_t i = 0; i < std::min(a.paths[0].size(), b.paths[0].size()); ++i) {
+        most = std::max(most, (a.paths[0][i] - b.paths[0][i]).norm());
+    }
+    return most;
+}
+
+// Which way a crack goes may hang on the toughness: then another toughness is not a run on the same walk.
+TEST(UnitKeptWalks, AnotherToughnessGoesItsOwnWay) {
+    for (const GrowthDirection direction : {GrowthDirection::energy_release_rate, GrowthDirection::normal_to_opening}) {
+        const Scene scene = across_inclined_rings(direction);
+        const Study study = toughness_study(scene);
+        const KeptWalks walks(study);
+        const bool turns = direction == GrowthDirection::energy_release_rate;
+        EXPECT_EQ(walks.turn_with_toughness(), turns);
+        EXPECT_EQ(walks.only_toughness(), !turns);
+        Scene tougher = scene;
+        tougher.materials["LW"].toughness = 400;
+        const Forward run = walks.exact();
+        const Record first = run(scene, nullptr), second = run(tougher, nullptr);
+        std::printf("ways for latewood of 100 and 400 J/m^2: %.3f mm apart\n", 1e3 * apart(first, second));
+        EXPECT_LT(apart(second, simulate(tougher)), 1e-9);
+        if (turns) {
+            EXPECT_GT(apart(first, second), 0.05e-3);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::testing
