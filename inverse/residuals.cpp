@@ -16,6 +16,7 @@ constexpr double noise_floor =
     0.002;  // of a curve's range: a good load cell or ruler, when nothing was said about noise
 constexpr double near_stations = 0.25e-3;  // least and largest growth between arrival stations [m]
 constexpr double far_stations = 0.5e-3;
+constexpr double line_averages = 1.5;  // rows, in the mean over its places, a line between two: the mean of s^2 + (1 - s)^2 is 1 / 1.5
 
 bool measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
@@ -67,16 +68,62 @@ double scatter(const Curve& rows) {
     return 1.4826 * *middle;
 }
 
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
 // Median of what a curve goes from row to row.
 double usual_step(const Curve& rows) {
     std::vector<double> steps{0.0};
     for (std::size_t i = 0; i + 1 < rows.y().size(); ++i) {
         steps.push_back(std::abs(rows.y()[i + 1] - rows.y()[i]));
     }
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    return *middle;
+    return median(std::move(steps));
 }
+
+// How the crack grew from row to row: steadily, so that the line between two rows says when it came up to a length, or by a jump, which
+// was anywhere between them.
+class GrowthByRows {
+  public:
+    GrowthByRows(const Curve& rows, double noise) : rows_(rows) {
+        constexpr double clear = 5.0;
+        std::vector<double> steady{0.0};
+        for (std::size_t i = 0; i + 1 < rows.y().size(); ++i) {
+            // What is beyond twice the growth of the rows before and after; growth begins and ends between rows as jumps do.
+            const double common = std::max(0.0, std::min(step(i - 1), step(i + 1)));
+            const double jumped = step(i) > clear * noise ? std::max(0.0, 1 - 2 * common / step(i)) : 0.0;
+            jump_error_.push_back(jumped * (rows.x()[i + 1] - rows.x()[i]));
+            if (jumped < 0.5 && step(i) > 0) {
+                steady.push_back(step(i));
+            }
+        }
+        steady_step_ = median(std::move(steady));
+    }
+
+    // Median growth between two rows of a crack that grows steadily [m].
+    double steady_step() const { return steady_step_; }
+
+    // What jumps within half a `window` of a place leave open there [m] or [s].
+    double error_near(double at, double window) const {
+        double error = 0;
+        for (std::size_t i = 0; i < jump_error_.size(); ++i) {
+            if (rows_.x()[i] < at + 0.5 * window && rows_.x()[i + 1] > at - 0.5 * window) {
+                error = std::max(error, jump_error_[i]);
+            }
+        }
+        return error;
+    }
+
+  private:
+    // From row i to the next; none beyond the ends, where i + 1 may wrap to 0.
+    double step(std::size_t i) const { return i + 1 > 0 && i + 1 < rows_.y().size() ? rows_.y()[i + 1] - rows_.y()[i] : 0.0; }
+
+    const Curve& rows_;
+    std::vector<double> jump_error_;  // of an arrival between two rows [m] or [s]
+    double steady_step_ = 0;
+};
 
 }  // namespace
 
@@ -221,30 +268,32 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         return;
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
-    const double sampling = (to - from) / static_cast<double>(rows.x().size() - 1);
-    const double spacing =
-        std::max(std::min(std::clamp(growth / 24, near_stations, far_stations), growth / 2), growth / most_arrivals);
+    const GrowthByRows growth_by_rows(rows, noise);
+    const double close = std::max(std::clamp(growth / 24, near_stations, far_stations), line_averages * growth_by_rows.steady_step());
+    const double spacing = std::max(std::min(close, growth / 2), growth / most_arrivals);
     const std::size_t first = stations_.size();
+    std::vector<double> reach;  // how far a station shares its rows with others [m] or [s]
     for (int i = 1; shortest + i * spacing < longest; ++i) {
         const double length = shortest + i * spacing;
         const std::optional<double> arrival = crack.arrival(length);
         if (!arrival) {
             continue;
         }
-        const int averaged =
-            std::max(1, rows.count(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
-        const double sigma_length = noise / std::sqrt(averaged);
-        const double early = crack.arrival(length - sigma_length).value_or(from);
-        const double late = crack.arrival(length + sigma_length).value_or(to);
+        const double averaged =
+            std::max(line_averages, 0.5 + rows.count(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
+        const double early = crack.arrival(length - noise).value_or(from);
+        const double late = crack.arrival(length + noise).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
-        station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_ / std::sqrt(averaged)), sampling);
+        const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
+        station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_) / std::sqrt(averaged), of_jump);
         station.sigma = std::hypot(station.sigma, model_resolution_ * *arrival);
         stations_.push_back(station);
+        reach.push_back(std::max(0.5 * arrival_window_, of_jump));
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());
     for (std::size_t i = first; i < stations_.size(); ++i) {
         const auto together = std::count_if(alone.begin(), alone.end(), [&](const FitResidual& other) {
-            return std::abs(other.measured - stations_[i].measured) <= 0.5 * arrival_window_;
+            return std::abs(other.measured - stations_[i].measured) <= reach[i - first];
         });
         stations_[i].sigma *= std::sqrt(static_cast<double>(together));
     }

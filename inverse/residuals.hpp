@@ -24,10 +24,10 @@ class Curve;
 /// tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next, as the crack jumps, when it did so is
 /// known to the rows' distance only, which counts as an error of its own.
 ///
-/// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth. What the
-/// crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a; it is never
-/// below the sampling interval, so that a jump has no infinite weight, and stations reached within one window share
-/// their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
+/// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer than it grows from
+/// row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a. Where
+/// growth jumps, starts or ends between two rows it is no less than the rows' distance, so that a jump has no infinite weight. Stations
+/// reached within one window, or in one jump, share their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
 ///

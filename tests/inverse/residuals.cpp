@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 namespace crampfit::testing {
 namespace {
@@ -74,12 +75,45 @@ TEST(UnitResiduals, ArrivalSigmaIsTheNoiseOverTheSlope) {
     }
 }
 
-TEST(UnitResiduals, ArrivalSigmaNeverFallsBelowTheSamplingInterval) {
+TEST(UnitResiduals, AJumpIsTimedToTheRowsAroundIt) {
     Experiment experiment = straight_experiment();
     experiment.noise.crack_length = 1e-9;
-    for (const FitResidual& station : of_kind(Comparison(experiment), "arrival")) {
-        EXPECT_NEAR(station.sigma, 1e-3 / 399, 1e-12);
+    for (std::size_t i = 0; i < experiment.data.crack_length.size(); ++i) {
+        experiment.data.crack_length[i] = i < 200 ? 2e-3 : 6e-3;
     }
+    const auto arrivals = of_kind(Comparison(experiment), "arrival");
+    ASSERT_GT(arrivals.size(), 8u);
+    for (const FitResidual& station : arrivals) {
+        EXPECT_GE(station.sigma, 0.999 * 1e-3 / 399);
+    }
+}
+
+TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
+    // Arrivals of rows with noise, about those without: about as large as their sigma says, and nearly each on its own.
+    constexpr int rows = 41, draws = 400;
+    Experiment experiment = straight_experiment();
+    const Record truth = straight(1e5, 8, 1e-3, rows);
+    experiment.noise.crack_length = 0.02e-3;
+    double squares = 0, neighbours = 0, count = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+        experiment.data = measure(truth, 0, 0.02e-3, static_cast<unsigned>(draw + 1));
+        const Comparison comparison(experiment);
+        const Eigen::VectorXd modelled = comparison.modelled(truth);
+        double before = 0;
+        for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+            const FitResidual& station = comparison.stations()[i];
+            if (station.kind != "arrival" || station.measured < 0.1e-3 || station.measured > 0.9e-3) continue;  // growth begins and ends there
+            const double residual = (modelled[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma;
+            squares += residual * residual;
+            neighbours += residual * before;
+            count += 1;
+            before = residual;
+        }
+    }
+    std::printf("%.0f stations a draw, mean square %.2f, autocorrelation %.3f\n", count / draws, squares / count, neighbours / squares);
+    EXPECT_LT(squares / count, 1.05);
+    EXPECT_GT(squares / count, 0.7);  // the window averages some more
+    EXPECT_LT(neighbours / squares, 0.2);
 }
 
 TEST(UnitResiduals, StationsInOneJumpCountTogetherAsOne) {
