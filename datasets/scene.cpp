@@ -153,8 +153,12 @@ void read_updates(const Entry& entry, SolverChoice& solver) {
 }  // namespace
 
 SolverChoice read_solver(const Entry& entry) {
-    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "damping", "extrapolate", "time_step"});
+    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "strain", "damping", "extrapolate", "time_step"});
     SolverChoice solver;
+    if (const auto strain = entry.find("strain")) {
+        solver.strain = strain->choice<StrainMeasure>(
+            {{"auto", StrainMeasure::automatic}, {"small", StrainMeasure::small}, {"finite rotation", StrainMeasure::finite_rotation}});
+    }
     if (const auto kind = entry.find("kind")) {
         solver.kind = kind->choice<SolverKind>({{"auto", SolverKind::automatic},
                                                 {"explicit", SolverKind::explicit_dynamics},

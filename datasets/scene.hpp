@@ -228,6 +228,7 @@ enum class ShapeFunction { automatic, linear, gimp, bspline2, cpdi };
 
 enum class VelocityUpdate { automatic, flip, pic, xpic, fmpm };  // automatic: the grid keeps its velocities
 enum class StressUpdate { first, last, average };
+enum class StrainMeasure { automatic, small, finite_rotation };
 
 struct SolverChoice {
     SolverKind kind = SolverKind::automatic;
@@ -236,6 +237,7 @@ struct SolverChoice {
     int order = 2;            // of XPIC and FMPM
     double pic_share = 0.0;   // of PIC in FLIP, 0..1
     StressUpdate stress_update = StressUpdate::last;
+    StrainMeasure strain = StrainMeasure::automatic;
     bool extrapolate = true;  // equilibrium: a second grid, twice as coarse, takes off most of the grid's error
     double damping = 0.0;   // mass-proportional, force = -damping * mass * velocity [1/s]
     std::optional<double> time_step = {};  // of equilibrium with wood that remembers [s]; absent: chosen

@@ -16,6 +16,7 @@ constexpr double noise_floor =
     0.002;  // of a curve's range: a good load cell or ruler, when nothing was said about noise
 constexpr double near_stations = 0.25e-3;  // least and largest growth between arrival stations [m]
 constexpr double far_stations = 0.5e-3;
+constexpr double rows_in_a_window = 2;  // of crack length, at least, where it is averaged
 constexpr double line_averages = 1.5;  // rows, in the mean over its places, a line between two: the mean of s^2 + (1 - s)^2 is 1 / 1.5
 
 bool measured(const std::vector<double>& column) {
@@ -255,7 +256,9 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
     const double from = rows.x().front();
     const double to = rows.x().back();
-    arrival_window_ = smoothing_window * (to - from);
+    // Few rows are taken as they are: a window would draw a jump's ends into the rows beside it, which the model's many rows do not show.
+    const bool sparse = smoothing_window * static_cast<double>(rows.x().size()) < rows_in_a_window;
+    arrival_window_ = sparse ? 0.0 : smoothing_window * (to - from);
     arrival_end_ = to;
     const Curve crack = rows.smoothed(arrival_window_);
     const double shortest = rows.mean(from, from + arrival_window_);
@@ -285,7 +288,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         const double late = crack.arrival(length + noise).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
         const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
-        station.sigma = std::max(std::hypot(0.5 * (late - early), abscissa_noise_) / std::sqrt(averaged), of_jump);
+        const double of_length = std::max(*arrival - early, late - *arrival);  // just before a jump and behind it one side says little
+        station.sigma = std::max(std::hypot(of_length, abscissa_noise_) / std::sqrt(averaged), of_jump);
         station.sigma = std::hypot(station.sigma, model_resolution_ * *arrival);
         stations_.push_back(station);
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
@@ -322,7 +326,7 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
     // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
     const double end = *std::max_element(abscissa.begin(), abscissa.end());
     const std::size_t rows = abscissa.size();
-    const bool ends_with_jump = rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-6 * arrival_window_ &&
+    const bool ends_with_jump = rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-8 * end &&
                                 lengths[rows - 1] > lengths[rows - 2];
     if (ends_with_jump && end < arrival_end_) {
         abscissa.push_back(arrival_end_);

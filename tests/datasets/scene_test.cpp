@@ -190,12 +190,14 @@ TEST(UnitScene, Updates) {
     EXPECT_EQ(fmpm.order, 4);
     EXPECT_EQ(fmpm.stress_update, StressUpdate::average);
     EXPECT_EQ(folder.parse(with("velocity_update = \"xpic\"")).solver.order, 2);
+    EXPECT_EQ(folder.parse(with("strain = \"finite rotation\"")).solver.strain, StrainMeasure::finite_rotation);
     const std::string file = (folder / "scene.toml").string();
     const auto refused = [&](const std::string& keys, const std::string& key, const std::string& rule) {
         expect_error(file, key, rule, [&] { folder.parse(with(keys)); });
     };
     refused("velocity_update = \"flipp\"", "solver.velocity_update", "did you mean \"flip\"?");
     refused("stress_update = \"middle\"", "solver.stress_update", "must be one of");
+    refused("strain = \"large\"", "solver.strain", "must be one of");
     refused("velocity_update = \"flip\"\norder = 2", "solver.order", "belongs to");
     refused("velocity_update = \"fmpm\"\norder = 0", "solver.order", "");
     refused("pic_share = 0.1", "solver.pic_share", "belongs to");

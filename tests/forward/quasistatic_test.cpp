@@ -497,5 +497,23 @@ TEST(VerificationWalk, FiniteRotationComesToTheSameAtSmallLoad) {
     EXPECT_NEAR(displacement_at_length(turning, 6e-3), displacement_at_length(linear, 6e-3), 1e-3 * a);
 }
 
+TEST(VerificationWalk, SmallStrainSaysHowMuchTurnsWouldChange) {
+    Scene scene = cantilevers(1e-3);
+    scene.materials["EW"].toughness = 5000.0;  // so that it stands
+    scene.stop = {.displacement = 2e-3, .crack_length = {}, .time = {}};
+    scene.solver.strain = StrainMeasure::small;
+    const Record small = simulate(scene);
+    scene.solver.strain = StrainMeasure::finite_rotation;
+    const Record finite = simulate(scene);
+    ASSERT_EQ(small.series.back().crack_length, finite.series.back().crack_length);
+    const double change = finite.series.back().force / small.series.back().force - 1;
+    const auto at = small.message.find("force by ");
+    ASSERT_NE(at, std::string::npos) << small.message;
+    const double said = std::stod(small.message.substr(at + 9)) / 100;
+    std::printf("cantilevers, 2 mm: turns change the force by %+.2f %%, said %+.2f %%\n", 100 * change, 100 * said);
+    EXPECT_NEAR(said, change, 0.002);
+    EXPECT_EQ(finite.message.find("small strain"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace crampfit::test
