@@ -28,8 +28,8 @@ Scene two_woods(double boundary, double tip, double cell) {
     return scene;
 }
 
-MissedEnergy missed_by(const AtRest& run, const std::vector<std::string>& keys = {}) {
-    return energy_missed_at_tip(run.scene, run.plan, run.body, run.equilibrium, 0, true, keys);
+MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numbers = {}) {
+    return energy_missed_at_tip(run.scene, run.plan, run.materials, run.body, run.equilibrium, 0, true, numbers);
 }
 
 TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
@@ -82,9 +82,9 @@ TEST(GradientFineTip, SlopesByModuliAgainstCentralDifferences) {
     for (const double tip : {1.93e-3, 2.08e-3}) {
         const Scene scene = two_woods(2.025e-3, tip, 0.1e-3);
         AtRest run(scene);
-        const MissedEnergy missed = missed_by(run, keys);
         std::vector<MaterialSlope> numbers;
         for (const std::string& key : keys) numbers.emplace_back(scene, key, run.body);
+        const MissedEnergy missed = missed_by(run, numbers);
         std::vector<Vec2> load = missed.by_displacement;
         for (Vec2& f : load) f *= -1.0;
         const Equilibrium::Motion yielding = run.equilibrium.yield_to(load);
