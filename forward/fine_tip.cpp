@@ -94,7 +94,7 @@ bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, cons
     return true;
 }
 
-// Wood and crack in a box of the specimen as a scene of their own.
+// What is cut out and the crack in a box of the specimen as a scene of their own; its wood is a part of the specimen's.
 Scene scene_in(const Scene& whole, const CrackLine& line, int crack, const Box& box, double cell) {
     Scene scene = whole;
     scene.model.cell = cell;
@@ -107,10 +107,6 @@ Scene scene_in(const Scene& whole, const CrackLine& line, int crack, const Box& 
     };
     for (Shape& shape : specimen.cutouts) move(shape);
     for (Part& part : specimen.parts) move(part.shape);
-    if (specimen.rings) specimen.rings->pith -= box.low;
-    if (specimen.picture) specimen.picture->offset -= box.low;
-    if (specimen.pith) *specimen.pith -= box.low;
-    specimen.file_offset -= box.low;
     scene.cracks = {whole.cracks[crack]};
     scene.cracks[0].points = line.points;
     for (Vec2& x : scene.cracks[0].points) x -= box.low;
@@ -152,8 +148,8 @@ struct CutOut {
     };
     std::vector<Hold> outline;
 
-    CutOut(const Scene& whole, const Plan& plan, const CrackLine& line, int crack, const Box& place, double cell)
-        : box(place), scene(scene_in(whole, line, crack, place, cell)), materials(scene), body(scene, materials),
+    CutOut(const Scene& whole, const Plan& plan, const MaterialMap& wood, const CrackLine& line, int crack, const Box& place, double cell)
+        : box(place), scene(scene_in(whole, line, crack, place, cell)), materials(wood.part(place.low)), body(scene, materials),
           equilibrium(held(scene, body, place, whole.specimen.size), plan, materials, body) {}
 
     bool solve(const View& from);
@@ -207,8 +203,8 @@ std::vector<Vec2> CutOut::slope_by(const View& from, const std::vector<Vec2>& in
 
 } // namespace
 
-MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const Discretisation& body, const Equilibrium& equilibrium, int crack,
-                                  bool at_end, const std::vector<std::string>& number_keys) {
+MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                                  const Equilibrium& equilibrium, int crack, bool at_end, const std::vector<MaterialSlope>& numbers) {
     const CrackFields& cracks = equilibrium.cracks();
     const CrackLine& line = cracks.lines[crack];
     const Vec2 tip = line.tip(at_end).position, size = body.layout.size();
@@ -247,24 +243,24 @@ MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const Di
         const View& from = views.back();
         Box box = box_around(from.body.layout, tip - from.origin, half_width);
         box = {box.low + from.origin, box.high + from.origin};
-        coarse.push_back(std::make_unique<CutOut>(scene, small, line, crack, box, cell));
-        fine.push_back(std::make_unique<CutOut>(scene, small, line, crack, box, 0.5 * cell));
+        coarse.push_back(std::make_unique<CutOut>(scene, small, materials, line, crack, box, cell));
+        fine.push_back(std::make_unique<CutOut>(scene, small, materials, line, crack, box, 0.5 * cell));
         if (!coarse.back()->solve(from) || !fine.back()->solve(from)) return {};
         missed.energy += share * (fine.back()->equilibrium.potential() - coarse.back()->equilibrium.potential());
         views.push_back(fine.back()->view());
         cell *= 0.5;
     }
-    if (number_keys.empty()) return missed;
+    if (numbers.empty()) return missed;
 
     // And up: the slopes.
-    missed.by_number.assign(number_keys.size(), 0.0);
+    missed.by_number.assign(numbers.size(), 0.0);
     std::vector<Vec2> slope(views.back().displacement.size(), Vec2::Zero());
     for (std::size_t k = fine.size(); k-- > 0;) {
         const auto slope_of = [&](CutOut& cut, const std::vector<Vec2>& inner, double sign) {
-            std::vector<MaterialSlope> numbers;
-            for (const std::string& key : number_keys) numbers.emplace_back(cut.scene, key, cut.body);
-            std::vector<double> by_number(number_keys.size(), 0.0);
-            const std::vector<Vec2> found = cut.slope_by(views[k], inner, numbers, by_number);
+            std::vector<MaterialSlope> here;
+            for (const MaterialSlope& number : numbers) here.emplace_back(number, cut.body, cut.box.low);
+            std::vector<double> by_number(numbers.size(), 0.0);
+            const std::vector<Vec2> found = cut.slope_by(views[k], inner, here, by_number);
             for (std::size_t n = 0; n < by_number.size(); ++n) missed.by_number[n] += sign * share * by_number[n];
             return found;
         };

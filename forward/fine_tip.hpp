@@ -2,7 +2,6 @@
 
 #include "forward/equilibrium.hpp"
 
-#include <string>
 #include <vector>
 
 namespace crampfit {
@@ -23,8 +22,8 @@ struct MissedEnergy {
 /// Nothing is missed where no sharp boundary lies within 4 cells of the tip; nor is it told where the box meets anything that holds or
 /// loads the specimen, or another crack.
 ///
-/// `number_keys`: those of numbers of the materials by which slopes are asked for.
-MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const Discretisation& body, const Equilibrium& equilibrium, int crack,
-                                  bool at_end, const std::vector<std::string>& number_keys = {});
+/// `numbers`: of the materials, by which slopes are asked for.
+MissedEnergy energy_missed_at_tip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                                  const Equilibrium& equilibrium, int crack, bool at_end, const std::vector<MaterialSlope>& numbers = {});
 
 } // namespace crampfit

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace crampfit {
 
@@ -36,9 +37,35 @@ Vec2 steepest(const std::vector<Eigen::Matrix3d>& value, int side) {
     return first_axis(tensor);
 }
 
+// A rectangle, and for an unevenness the spread of its places.
+using Rectangle = std::array<std::int64_t, 6>;
+
+Rectangle rectangle(const Vec2& centre, const Vec2& half, const Vec2& spread) {
+    constexpr double part = 1e-3, length = 1e-15;  // of half the rectangle, and [m]
+    Rectangle found;
+    for (int axis = 0; axis < 2; ++axis) {
+        found[axis] = std::llround(centre[axis] / (part * half[axis]));
+        found[2 + axis] = std::llround(half[axis] / length);
+        found[4 + axis] = std::llround(spread[axis] / part);
+    }
+    return found;
+}
+
 } // namespace
 
-MaterialMap::MaterialMap(const Scene& scene) : scene_(scene) {
+struct MaterialMap::Known {
+    std::map<Rectangle, LocalWood> average;
+    std::map<Rectangle, Unevenness> unevenness;
+};
+
+MaterialMap MaterialMap::part(const Vec2& corner) const {
+    MaterialMap part = *this;
+    part.corner_ += corner;
+    part.is_part_ = true;
+    return part;
+}
+
+MaterialMap::MaterialMap(const Scene& scene) : scene_(scene), known_(std::make_shared<Known>()) {
     const SpecimenPlan& plan = scene.specimen;
     if (plan.map) {
         for (const std::string& name : plan.map->classes) materials_.push_back(scene.materials.at(name));
@@ -166,7 +193,9 @@ LocalWood MaterialMap::in_picture(const Vec2& x) const {
     return wood;
 }
 
-LocalWood MaterialMap::at(const Vec2& x) const {
+LocalWood MaterialMap::at(const Vec2& x) const { return at_place(x + corner_); }
+
+LocalWood MaterialMap::at_place(const Vec2& x) const {
     if (scene_.specimen.map) return in_picture(x);
     if (homogeneous_) return pure_[0];
     LocalWood wood = scene_.specimen.rings ? in_rings(x) : pure_[0];
@@ -230,11 +259,13 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
 
 // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
 int MaterialMap::samples_a_side(const Vec2& half) const {
-    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_)) : 16;
+    constexpr double rounding = 1e-6;  // one more sample than twice a whole number of pixels would put some of them on the edges of pixels
+    const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_ - rounding)) : 16;
     return std::clamp(fit, 2, 16);
 }
 
-std::vector<double> MaterialMap::shares(const Vec2& centre, const Vec2& half) const {
+std::vector<double> MaterialMap::shares(const Vec2& middle, const Vec2& half) const {
+    const Vec2 centre = middle + corner_;
     std::vector<double> shares(materials_.size(), 0.0);
     const LocalWood* all = homogeneous_ ? &pure_[0] : band_around(centre, half);
     if (all) {
@@ -245,7 +276,7 @@ std::vector<double> MaterialMap::shares(const Vec2& centre, const Vec2& half) co
     double filled = 0.0;
     for (int k = 0; k < samples * samples; ++k) {
         const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
-        const LocalWood here = at(centre + place.cwiseProduct(half));
+        const LocalWood here = at_place(centre + place.cwiseProduct(half));
         if (here.filled == 0.0) continue;
         shares[here.material] += 1.0;
         filled += 1.0;
@@ -256,7 +287,15 @@ std::vector<double> MaterialMap::shares(const Vec2& centre, const Vec2& half) co
 
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     if (homogeneous_) return pure_[0];
-    if (const LocalWood* wood = band_around(centre, half)) return *wood;
+    const Vec2 x = centre + corner_;
+    if (const LocalWood* wood = band_around(x, half)) return *wood;
+    if (!is_part_) return find_average(x, half);
+    const auto [known, missing] = known_->average.try_emplace(rectangle(x, half, Vec2::Zero()));
+    if (missing) known->second = find_average(x, half);
+    return known->second;
+}
+
+LocalWood MaterialMap::find_average(const Vec2& centre, const Vec2& half) const {
     const int samples = samples_a_side(half);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
@@ -264,7 +303,7 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
             const Vec2 place((2.0 * i + 1.0) / samples - 1.0, (2.0 * j + 1.0) / samples - 1.0);
-            const LocalWood here = at(centre + place.cwiseProduct(half));
+            const LocalWood here = at_place(centre + place.cwiseProduct(half));
             if (here.filled > 0.0) {
                 least = std::min(least, here.latewood);
                 most = std::max(most, here.latewood);
@@ -295,13 +334,21 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
 
 Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
     if (!average.mixed || average.filled < 1.0) return {};
+    const Vec2 x = centre + corner_;
+    if (!is_part_) return find_unevenness(x, half, average, spread);
+    const auto [known, missing] = known_->unevenness.try_emplace(rectangle(x, half, spread));
+    if (missing) known->second = find_unevenness(x, half, average, spread);
+    return known->second;
+}
+
+Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
     using Coefficients = LayeredElasticity::Coefficients;
     const int samples = samples_a_side(half);
     const Vec2 normal = average.elasticity.normal;
     std::vector<Coefficients> wood;
     for (int k = 0; k < samples * samples; ++k) {
         const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
-        const LocalWood here = at(centre + place.cwiseProduct(half));
+        const LocalWood here = at_place(centre + place.cwiseProduct(half));
         wood.push_back(orthotropic_ ? layered(here.elasticity.stiffness(), normal).coefficients : here.elasticity.coefficients);
     }
     const Coefficients of_average = average.elasticity.coefficients;

@@ -2,6 +2,8 @@
 
 #include "forward/elasticity.hpp"
 
+#include <memory>
+
 namespace crampfit {
 
 /// What wood is made of at a place, or on average over an area.
@@ -39,6 +41,10 @@ class MaterialMap {
     /// that remembers where there is transition or orthotropic wood.
     explicit MaterialMap(const Scene& scene);
 
+    /// The same wood as a part of the specimen sees it that has its lower left corner there. What rectangles hold on average is found
+    /// once for all such parts, places counting to a thousandth of the rectangle; parts are for one thread at a time.
+    MaterialMap part(const Vec2& corner) const;
+
     /// At a place. Outside a picture the nearest pixel counts, so that rounding at the edge costs no points.
     LocalWood at(const Vec2& x) const;
 
@@ -62,6 +68,10 @@ class MaterialMap {
     std::vector<double> shares(const Vec2& centre, const Vec2& half) const;
 
   private:
+    struct Known;
+    LocalWood at_place(const Vec2& x) const;
+    LocalWood find_average(const Vec2& centre, const Vec2& half) const;
+    Unevenness find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
     LocalWood mix(int first, int second, double grade) const;
     void check_radial_direction() const;
     void check_transition(int first) const;
@@ -83,6 +93,9 @@ class MaterialMap {
     double picture_cos_ = 1.0;
     double picture_sin_ = 0.0;
     double finest_ = 0.0;                       // size of the finest detail to average over [m]; 0: none
+    Vec2 corner_ = Vec2::Zero();                // of what places count from, in the specimen [m]
+    std::shared_ptr<Known> known_;              // of all parts
+    bool is_part_ = false;
     bool homogeneous_ = true;
     bool orthotropic_ = false;
     bool remembers_ = false;

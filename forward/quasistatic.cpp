@@ -14,10 +14,9 @@ namespace {
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
 
-// An advance is taken in at least so many stations, and in as many as it has cells. Where the crack is about to leave latewood the load
-// that it needs rises and falls within an advance, and two stations miss the peak by up to 10 %. That is left so where stations are dear:
-// in a scene that is not linear, and with several tips, each of which is tried.
-constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4;
+// An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where stations are
+// cheap, in so many about a narrow peak of the load that the crack needs.
+constexpr int least_stations_in_advance = 2, least_stations_in_peak = 8;
 
 // Into how many steps the loading of a scene that is not linear is divided.
 constexpr int loading_steps = 32;
@@ -58,22 +57,24 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
                          int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_, threads), number_keys_(numbers) {
+      equilibrium_(scene, plan, materials, body_, threads) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
     const double cell = body_.layout.cell.minCoeff();
-    const int least_stations = plan.linear && growing_tips(scene) == 1 ? least_stations_where_cheap : least_stations_in_advance;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
         std::size_t ahead = 0;
-        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations_in_advance, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
         if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
         if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
     }
-    way_.push_back(add_place(-1, 0u));
+    if (leader) closer_ = leader->closer_;
+    else if (plan.linear && growing_.size() == 1 && growing_[0].ahead > 0)
+        while (closer_ < 4 && closer_ * static_cast<int>(growing_[0].ahead) < least_stations_in_peak) closer_ *= 2;
+    way_.push_back(add_place(-1, {}));
     if (leader && plan.linear) know_linear(0);
 }
 
@@ -109,12 +110,12 @@ LoadState Quasistatic::load_state() const {
 }
 
 // At all tips whose next advance counts.
-MissedEnergy Quasistatic::missed(const std::vector<std::string>& number_keys) const {
+MissedEnergy Quasistatic::missed(const std::vector<MaterialSlope>& numbers) const {
     MissedEnergy all;
     if (plan_.remembers) return all;
     for (const GrowingTip& tip : growing_) {
         if (tip.ahead == 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
-        const MissedEnergy one = energy_missed_at_tip(scene_, plan_, body_, equilibrium_, tip.crack, tip.at_end, number_keys);
+        const MissedEnergy one = energy_missed_at_tip(scene_, plan_, materials_, body_, equilibrium_, tip.crack, tip.at_end, numbers);
         all.energy += one.energy;
         if (one.by_number.empty()) continue;
         all.by_number.resize(one.by_number.size());

@@ -4,6 +4,7 @@
 #include "forward/equilibrium.hpp"
 #include "forward/fine_tip.hpp"
 
+#include <compare>
 #include <deque>
 #include <limits>
 #include <map>
@@ -17,6 +18,9 @@ namespace crampfit {
 /// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
 /// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
 /// crack took when it was first followed, so that other toughnesses find most of what they need here.
+///
+/// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there stations
+/// of a linear scene stand closer, whatever the toughness.
 ///
 /// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing tells
 /// apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
@@ -87,15 +91,20 @@ class Quasistatic {
         double increment;                               // of its crack's length between stations [m]
         std::size_t ahead;                              // stations that an advance spans
     };
+    struct Step {                                       // from one place to the next
+        unsigned tips = 0;                              // that go on, a bit each
+        int quarters = 4;                               // of their increment
+        auto operator<=>(const Step&) const = default;
+    };
     struct Place {                                      // of all tips: on the way, or tried
         Station station;
         int parent = -1;
-        unsigned moved = 0;                             // tips that have gone on since the parent, a bit each
+        Step step;                                      // from the parent
         unsigned inside = 0;                            // growing tips that can go on from here
         unsigned tips = 0;                              // those of the station's `moving`
         int further = -1;                               // the place where they have gone an advance on
-        std::map<unsigned, int> next;                   // places by the tips that have gone on from here
-        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; not in a linear scene with a single tip
+        std::map<Step, int> next;                       // places that tips have gone on to from here
+        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; in a linear scene with a single tip of the last places only
         std::map<int, Known> known;                     // by number of the time
         std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
@@ -106,9 +115,13 @@ class Quasistatic {
 
     Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers, int threads,
                 const Quasistatic* leader);
-    int add_place(int parent, unsigned moved);
-    int next(int number, unsigned tips, double now);
-    Vec2 next_tip(const GrowingTip& growing, const LoadState* state) const;
+    int add_place(int parent, Step step);
+    int next(int number, Step step, double now);
+    Vec2 next_tip(const GrowingTip& growing, const LoadState* state, int quarters) const;
+    bool extend(double now);
+    std::vector<int> closer_places(const std::array<int, 3>& about, double now);
+    int place_between(int number, int quarters, double now);
+    double released(int number, int time);
     bool follow_leader(std::size_t place);
     bool let_move(int number, unsigned tips, double now);
     void keep_only_from(int number);
@@ -140,7 +153,7 @@ class Quasistatic {
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     LoadState load_state() const;
-    MissedEnergy missed(const std::vector<std::string>& number_keys) const;
+    MissedEnergy missed(const std::vector<MaterialSlope>& numbers) const;
     LoadState nothing(double time) const;
     double time_of(int number) const { return number * time_step_; }
 
@@ -150,7 +163,6 @@ class Quasistatic {
     const Quasistatic* leader_;
     Discretisation body_;
     Equilibrium equilibrium_;
-    std::vector<std::string> number_keys_;
     std::vector<MaterialSlope> numbers_;
     std::vector<double> shift_;                   // [numbers]; empty: none
     std::deque<Place> places_;                    // parents first
@@ -158,6 +170,8 @@ class Quasistatic {
     const Place* entered_ = nullptr;              // the one that the equilibrium stands at
     std::vector<GrowingTip> growing_;
     std::vector<int> way_;                        // [stations] places
+    std::deque<int> coming_;                      // that the way goes on through, as far as it is told
+    int closer_ = 1;                              // so much closer may stations stand: 1, 2 or 4
     std::map<unsigned, double> tried_;            // by front: its critical time when it was tried last, times `drive` then
     double time_step_ = 0;                        // between two times at which equilibria are known [s]
     int last_time_ = 0;                           // number of the last of them

@@ -25,13 +25,24 @@ constexpr double far_above = 1.5;
 // G at the tip over toughness below which a crack is not about to move.
 constexpr double far_below = 0.3;
 
+// Of a single tip in a linear scene so many of the last places can be come back to: more than closer stations ask for.
+constexpr std::size_t kept_places = 32;
+
+// Second difference of the energy released over the least of three, above which stations stand closer: at an eighth of it a parabola has
+// its least between them, and the load its peak half of that higher.
+constexpr double narrow = 0.04;
+
+bool is_narrow(double before, double least, double after) {
+    return least > 0.0 && before > least && after > least && before - 2.0 * least + after > narrow * least;
+}
+
 } // namespace
 
 // The equilibrium stands at a new place of the cracks.
-int Quasistatic::add_place(int parent, unsigned moved) {
+int Quasistatic::add_place(int parent, Step step) {
     Place& place = places_.emplace_back();
     place.parent = parent;
-    place.moved = moved;
+    place.step = step;
     Station& station = place.station;
     station.thickness = body_.layout.thickness;
     station.linear = plan_.linear;
@@ -44,7 +55,8 @@ int Quasistatic::add_place(int parent, unsigned moved) {
     for (std::size_t t = 0; t < growing_.size(); ++t)
         if (equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) place.inside |= 1u << t;
     station.left = place.inside == 0;
-    if (!plan_.linear || growing_.size() > 1) place.snapshot = equilibrium_.save();
+    if (!plan_.linear || growing_.size() > 1 || closer_ > 1) place.snapshot = equilibrium_.save();
+    if (plan_.linear && growing_.size() == 1 && places_.size() > kept_places) places_[places_.size() - 1 - kept_places].snapshot.reset();
     entered_ = &place;
     return static_cast<int>(places_.size()) - 1;
 }
@@ -55,12 +67,12 @@ void Quasistatic::enter(const Place& place) {
     entered_ = &place;
 }
 
-Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state) const {
+Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, int quarters) const {
     if (leader_) return leader_->places_[places_.size()].station.tips[growing.crack][growing.at_end];
     const CrackTip& tip = equilibrium_.cracks().lines[growing.crack].tip(growing.at_end);
     const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
-    return tip.position + growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
+    return tip.position + 0.25 * quarters * growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
@@ -68,26 +80,26 @@ int Quasistatic::time_until(double now) const {
     return plan_.linear ? last_time_ : std::clamp(static_cast<int>(now / time_step_), 1, last_time_);
 }
 
-// The place where these tips have gone on by an increment; -1 where there is no equilibrium.
-int Quasistatic::next(int number, unsigned tips, double now) {
+// The place where tips have gone on by a step; -1 where there is no equilibrium.
+int Quasistatic::next(int number, Step step, double now) {
     Place& from = places_[number];
-    if (!leader_) tips &= from.inside;
-    if (const auto known = from.next.find(tips); known != from.next.end()) return known->second;
+    if (!leader_) step.tips &= from.inside;
+    if (const auto known = from.next.find(step); known != from.next.end()) return known->second;
     const int time = time_until(now);
     if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
     if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
     std::vector<CrackFields::NewField> fields;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
-        if (!(tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
-        const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.states.at(time));
+        if (!(step.tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
+        const Vec2 to = next_tip(growing_[t], leader_ ? nullptr : &from.states.at(time), step.quarters);
         const auto grown = equilibrium_.grow(growing_[t].crack, growing_[t].at_end, to);
         fields.insert(fields.end(), grown.begin(), grown.end());
     }
-    const int added = add_place(number, tips);
+    const int added = add_place(number, step);
     places_[added].new_fields = std::move(fields);
     if (plan_.linear && !know_linear(added)) return -1;
-    from.next[tips] = added;
+    from.next[step] = added;
     return added;
 }
 
@@ -96,7 +108,7 @@ bool Quasistatic::follow_leader(std::size_t place) {
     while (places_.size() <= place) {
         if (places_.size() >= leader_->places_.size()) return false;
         const Place& led = leader_->places_[places_.size()];
-        if (next(led.parent, led.moved, 0.0) < 0) return false;
+        if (next(led.parent, led.step, 0.0) < 0) return false;
     }
     return true;
 }
@@ -117,7 +129,7 @@ bool Quasistatic::let_move(int number, unsigned tips, double now) {
         ahead = stations;
     }
     for (std::size_t k = 0; k < ahead && (places_[place.further].inside & tips); ++k) {
-        const int on = next(place.further, tips, now);
+        const int on = next(place.further, {tips}, now);
         if (on < 0) return false;
         place.further = on;
         for (auto& [crack, at_end, route] : place.station.moving) {
@@ -130,15 +142,84 @@ bool Quasistatic::let_move(int number, unsigned tips, double now) {
 
 bool Quasistatic::reach(std::size_t station, double now) {
     while (way_.size() <= station) {
-        const Place& last = places_[way_.back()];
-        if (last.station.moving.empty()) return false;  // the way ends, or it is not known yet which tips move
-        const int on = next(way_.back(), last.tips, now);
-        if (on < 0) return fail();
-        way_.push_back(on);
-        if (plan_.linear && growing_.size() > 1) keep_only_from(on);
+        if (places_[way_.back()].station.moving.empty()) return false;  // the way ends, or it is not known yet which tips move
+        if (coming_.empty() && !extend(now)) return fail();
+        way_.push_back(coming_.front());
+        coming_.pop_front();
+        if (plan_.linear && growing_.size() > 1) keep_only_from(way_.back());
     }
     if (growing_.size() == 1 && !places_[way_[station]].station.left && !let_move(way_[station], 1u, now)) fail();
     return true;
+}
+
+// Tells where the way goes on from its last place: an increment, or two with closer places between them where the second place is one of
+// narrowly least energy released. At regular places only.
+bool Quasistatic::extend(double now) {
+    const int last = way_.back();
+    const unsigned tips = places_[last].tips;
+    const int on = next(last, {tips}, now);
+    if (on < 0) return false;
+    coming_ = {on};
+    if (closer_ == 1 || places_[on].station.left || !let_move(on, tips, now)) return true;
+    const int after = next(on, {tips}, now);
+    if (after < 0 || places_[after].station.left || !let_move(after, tips, now) || places_[places_[after].further].station.left) return true;
+    const std::vector<int> closer = closer_places({last, on, after}, now);
+    if (!closer.empty()) coming_.assign(closer.begin(), closer.end());
+    return true;
+}
+
+// The energy that a place's next advance releases; negative where it is not known [J].
+double Quasistatic::released(int number, int time) {
+    const int further = places_[number].further;
+    if (!know_exactly(number, time) || !know_exactly(further, time)) return -1.0;
+    return places_[number].states.at(time).potential - places_[further].states.at(time).potential;
+}
+
+// Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of narrowly
+// least energy released; else none. First half way to either side, then about the least of these.
+std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, double now) {
+    const int time = time_until(now);
+    std::map<int, std::pair<int, double>> found;  // by quarters of an increment from the first: place, and energy released
+    const auto add = [&](int quarters, int place) {
+        found[quarters] = {place, place < 0 ? -1.0 : released(place, time)};
+    };
+    const auto narrow_at = [&](int middle, int apart) {
+        return is_narrow(found[middle - apart].second, found[middle].second, found[middle + apart].second);
+    };
+    for (int k = 0; k < 3; ++k) add(4 * k, about[k]);
+    int least = 4;
+    for (int apart = 4; 4 / apart < closer_ && narrow_at(least, apart); apart /= 2) {
+        for (const int side : {-apart / 2, apart / 2}) {
+            const int quarters = least + side;
+            add(quarters, place_between(about[quarters / 4], quarters % 4, now));
+            if (found[quarters].second <= 0.0) return {};
+        }
+        for (const int quarters : {least - apart / 2, least + apart / 2})
+            if (found[quarters].second < found[least].second) least = quarters;
+    }
+    std::vector<int> places;
+    if (found.size() == about.size()) return places;
+    for (const auto& [quarters, place] : found)
+        if (quarters > 0) places.push_back(place.first);
+    return places;
+}
+
+// A place some quarters of an increment beyond a regular one, with what lies an advance ahead of it; -1 where there is no equilibrium.
+int Quasistatic::place_between(int number, int quarters, double now) {
+    const unsigned tips = places_[number].tips;
+    const int between = next(number, {tips, quarters}, now);
+    if (between < 0) return -1;
+    const int further = next(places_[number].further, {tips, quarters}, now);
+    if (further < 0) return -1;
+    Place& place = places_[between];
+    place.tips = tips;
+    place.further = further;
+    place.station.moving = places_[number].station.moving;
+    for (auto& [crack, at_end, route] : place.station.moving) {
+        route.front() = place.station.tips[crack][at_end];
+        route.push_back(places_[further].station.tips[crack][at_end]);
+    }
+    return between;
 }
 
 // In a linear scene no one comes back to what does not lie ahead of a place.

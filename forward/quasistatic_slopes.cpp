@@ -65,7 +65,7 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
         if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
     }
-    if (const MissedEnergy energy = missed(number_keys_); !energy.by_number.empty()) {
+    if (const MissedEnergy energy = missed(numbers_); !energy.by_number.empty()) {
         std::vector<Vec2> load = energy.by_displacement;
         for (Vec2& f : load) f *= -1.0;
         const Equilibrium::Motion yielding = equilibrium_.yield_to(load);

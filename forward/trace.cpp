@@ -1,6 +1,7 @@
 #include "forward/trace.hpp"
 
 #include "forward/boundary.hpp"
+#include "forward/load_peak.hpp"
 #include "forward/recorder.hpp"
 
 #include <algorithm>
@@ -99,6 +100,7 @@ class Tracer {
         fracture_energy_.push_back(spent);
         const Quasistatic::Critical found = walk_.critical(i, materials_, now);
         critical_.push_back(found.time);
+        toughness_.push_back(found.toughness);
         list_driving(i, found, now);
         return walk_.failure().empty();
     }
@@ -126,6 +128,12 @@ class Tracer {
             here = moment(i, std::max(now, critical_[i]));
             now = std::max(now, critical_[i]);
             if (go_on_ && !go_on_(now, length_of(here))) return end(RunStatus::interrupted, "stopped by the user");
+            if (const auto top = peak_beyond(i, now)) {
+                go(here, *top);
+                if (done_) return;
+                here = *top;
+                now = top->load.time;
+            }
             // Over all that needs no more load.
             std::size_t next = i + 1;
             bool known = know_station(next, now);
@@ -147,6 +155,31 @@ class Tracer {
             }
             i = next;
         }
+    }
+
+    // The way's highest load between a station and the next, where it is higher there than at both.
+    std::optional<Moment> peak_beyond(std::size_t i, double now) {
+        if (i == 0 || growing_tips(scene_) != 1 || walk_.station(i).route_length() == 0.0) return std::nullopt;
+        if (!know_station(i + 1, now) || !std::isfinite(critical_[i + 1])) return std::nullopt;
+        if (!know_station(i + 2, std::max(now, critical_[i + 1]))) return std::nullopt;
+        const auto find_peak = [&] {
+            std::array<NeededLoad, 4> places;
+            for (std::size_t k = 0; k < 4; ++k)
+                places[k] = {walk_.station(i - 1 + k).lengths[tracked_.crack], critical_[i - 1 + k], toughness_[i - 1 + k]};
+            return peak_between(places);
+        };
+        auto peak = find_peak();
+        if (peak && !plan_.linear) {  // what has been due before is known roughly
+            for (const std::size_t k : {i + 1, i + 2})
+                if (critical_[k] < now) critical_[k] = walk_.critical(k, materials_, now, true).time;
+            peak = find_peak();
+        }
+        if (!peak || peak->time <= now) return std::nullopt;
+        const double from = walk_.station(i).lengths[tracked_.crack], to = walk_.station(i + 1).lengths[tracked_.crack];
+        const Moment top = mixed(moment(i, peak->time), moment(i + 1, peak->time), (peak->length - from) / (to - from));
+        const auto beyond = std::ranges::upper_bound(record_.driving, peak->length, {}, &CriticalLoad::crack_length);
+        record_.driving.insert(beyond, driving_row(top.load, tracked_, peak->length, top.tips[tracked_.crack][tracked_.at_end], peak->toughness));
+        return top;
     }
 
     void split() { end(RunStatus::split, "every growing crack tip has reached a free surface or another crack"); }
@@ -300,16 +333,20 @@ class Tracer {
         const Station& station = walk_.station(i);
         if (station.moving.empty() || !std::isfinite(found.time)) return;
         if (!station.linear && found.time < now && found.time < station.states.begin()->second.time) return;
-        const LoadState load = station.at(found.time);
         const auto& [crack, at_end, route] = station.moving.front();
+        const LoadState load = station.at(found.time);
+        record_.driving.push_back(driving_row(load, {crack, at_end}, station.lengths[crack], station.tips[crack][at_end], found.toughness));
+    }
+
+    CriticalLoad driving_row(const LoadState& load, const TrackedTip& at, double length, const Vec2& tip, double toughness) const {
         CriticalLoad row;
-        row.crack_length = station.lengths[crack];
-        row.tip = station.tips[crack][at_end];
+        row.crack_length = length;
+        row.tip = tip;
         row.displacement = load.displacement;
         if (!load.reactions.empty()) row.force = load.reactions[gauges_.force].dot(gauges_.force_direction);
-        row.G = load.tips[2 * crack + at_end].G;
-        row.toughness = found.toughness;
-        record_.driving.push_back(row);
+        row.G = load.tips[2 * at.crack + at.at_end].G;
+        row.toughness = toughness;
+        return row;
     }
 
     const Scene& scene_;
@@ -320,6 +357,7 @@ class Tracer {
     Gauges gauges_;
     TrackedTip tracked_;
     std::vector<double> critical_;         // [stations] [s]
+    std::vector<double> toughness_;        // [stations] overcome then [J/m^2]
     std::vector<double> fracture_energy_;  // [stations] [J]
     double sample_ = 0;                    // [s]
     Record record_;
