@@ -78,7 +78,7 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
         double& end = left[j] < 0 ? parameter.lower_95 : parameter.upper_95;
         end = box.value(j, box.share(j, end * unit) + left[j]) / unit;
         own[j] = box.slope(j, x[j]) / unit * left[j];
-        told.push_back(fmt::format("'{}' by {:+.2g} %", parameter.name, 100 * (box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1)));
+        told.push_back(fmt::format("'{}' {:+.2g} %", parameter.name, 100 * (box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1)));
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
     fit.covariance += own * own.transpose() / 3.0;  // the mean square of what is spread evenly from 0 to 1
@@ -88,8 +88,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     }
     fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
-    fit.message += fmt::format("The grid may leave {}, as a run on cells twice as wide tells; intervals take that in on its side, and it makes up "
-                               "to {:.0f} % of a variance. ",
+    fit.message += fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. Intervals take that in "
+                               "on its side; it makes up to {:.0f} % of a variance. ",
                                fmt::join(told, ", "), 100 * most);
 }
 
