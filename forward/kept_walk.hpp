@@ -30,6 +30,9 @@ class KeptWalk {
     /// method leaves: so does what a run gives.
     bool linear() const { return plan_.linear; }
 
+    /// Whether a second grid, with cells twice as wide, takes its share off (Quasistatic).
+    bool extrapolates() const { return plan_.extrapolates; }
+
     /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
     /// with the equilibria that are known, where it can. One run at a time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options, bool rough = false);

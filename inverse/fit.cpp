@@ -5,6 +5,7 @@
 #include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/explore.hpp"
+#include "inverse/grid_share.hpp"
 #include "inverse/kept_walks.hpp"
 #include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
@@ -19,6 +20,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -230,11 +232,14 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             names.push_back(parameter.name);
         }
         std::optional<CloseLook> close;  // where runs near the best one are cheap, as the simulation has derivatives
+        std::future<Evaluation> wide;    // there, the best values on cells twice as wide
         const auto estimate = [&] {
             if (!by_walks) {
                 return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
             }
             const Eigen::VectorXd x = objective.best()->x;
+            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, run_on_wide_cells, std::cref(study), box.values(x),
+                              options.stop_requested);
             close.emplace(look_close(objective, near(x), x, model.curve_lengths(), names, options.seed));
             return close->uncertainty;
         };
@@ -267,6 +272,14 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         }
         const Window whole(best.x, 1.0);
         fill_exploration(fit, box, close ? close->window : whole, uncertainty, exploration);
+        if (close) {
+            const Evaluation there = wide.get();
+            if (there.usable() && uncertainty.slope.size() > 0) {
+                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty, close->window));
+            } else {
+                fit.message += fmt::format("What the grid leaves is not known; cells twice as wide: {}. ", there.status);
+            }
+        }
         fit.misfit = best.evaluation->misfit;
         fit.reduced_chi_square = uncertainty.reduced_chi_square;
         fit.residuals = model.residuals(*best.evaluation);

@@ -37,12 +37,19 @@ void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, uns
     }
 }
 
-// Where failed runs end a method before its time, a simplex method that only compares misfits goes on from the best
+// Methods that lead a polynomial through the misfits of single runs take what stands for a failed one for the misfit there.
+bool is_misled(const Objective& objective, const Method& method) {
+    return (method.name == "bobyqa" || method.name == "cobyla") &&
+           std::any_of(objective.runs().begin(), objective.runs().end(), [](const Run& run) { return !run.evaluation->usable(); });
+}
+
+// Where failed runs end a method before its time or mislead it, a simplex method that only compares misfits goes on from the best
 // point.
 Solution descend(Objective& objective, const Eigen::VectorXd& start, const Method& method) {
     Solution solution = minimize(objective, start, method);
-    if (!solution.converged && !objective.exhausted() && objective.best()) {
-        const std::string why = solution.message;
+    const bool misled = is_misled(objective, method);
+    if ((!solution.converged || misled) && !objective.exhausted() && objective.best()) {
+        const std::string why = solution.converged ? "runs failed" : solution.message;
         const Eigen::VectorXd best = objective.best()->x;
         solution = minimize(objective, best, {"sbplx", method.seed});
         solution.message = fmt::format("{} gave up ({}); sbplx went on", method.name, why);

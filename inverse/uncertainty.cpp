@@ -162,6 +162,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.covariance += own;
     result.widening = widening;
     result.model_variance = own.diagonal();
+    result.slope = directions->model.jacobian();
     result.untold = undetermined.message();
     result.message += result.untold;
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();

@@ -20,6 +20,7 @@ struct Uncertainty {
     double widening = 1;  // s: of variances, for what the noise does not explain
     double quantile = 2;  // of Student's distribution, from standard error to interval
     std::string untold = {};  // which parameters cannot be told (apart), for a person; part of `message` too
+    Eigen::MatrixXd slope = {};           // J [residuals x parameters]; empty where it is not known
     Eigen::VectorXd model_variance = {};  // diagonal of V [parameters]; empty where it is not known
 };
 

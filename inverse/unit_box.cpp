@@ -12,6 +12,11 @@ double UnitBox::value(Eigen::Index j, double x) const {
     return std::clamp(value, p.lower, p.upper);
 }
 
+double UnitBox::share(Eigen::Index j, double value) const {
+    const Parameter& p = parameter(j);
+    return p.scale == Scale::logarithmic ? std::log(value / p.lower) / std::log(p.upper / p.lower) : (value - p.lower) / (p.upper - p.lower);
+}
+
 double UnitBox::slope(Eigen::Index j, double x) const {
     const Parameter& p = parameter(j);
     return p.scale == Scale::logarithmic ? value(j, x) * std::log(p.upper / p.lower) : p.upper - p.lower;
@@ -28,9 +33,7 @@ Eigen::VectorXd UnitBox::values(const Eigen::VectorXd& x) const {
 Eigen::VectorXd UnitBox::initial() const {
     Eigen::VectorXd x(size());
     for (Eigen::Index j = 0; j < size(); ++j) {
-        const Parameter& p = parameter(j);
-        x[j] = p.scale == Scale::logarithmic ? std::log(p.initial / p.lower) / std::log(p.upper / p.lower)
-                                             : (p.initial - p.lower) / (p.upper - p.lower);
+        x[j] = share(j, parameter(j).initial);
     }
     return x;
 }

@@ -18,6 +18,7 @@ class UnitBox {
     const std::vector<Parameter>& parameters() const { return parameters_; }
 
     double value(Eigen::Index j, double x) const;  // SI, never outside the bounds
+    double share(Eigen::Index j, double value) const;  // and back: x of an SI value
     double slope(Eigen::Index j, double x) const;  // dp/dx, SI
     Eigen::VectorXd values(const Eigen::VectorXd& x) const;
     Eigen::VectorXd initial() const;  // in the unit cube

@@ -1,0 +1,96 @@
+#include "inverse/grid_share.hpp"
+
+#include "forward/kept_walk.hpp"
+#include "forward/simulate.hpp"
+
+#include <Eigen/QR>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+namespace {
+
+// Of the largest, all columns being of length one: below that a slope is curvature.
+constexpr double resolved = 1e-3;
+
+// Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
+double share_of_grids(const Scene& scene) { return KeptWalk(scene).extrapolates() ? 0.75 : 1.0; }
+
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorXd& change) {
+    const Eigen::VectorXd scale = slope.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
+    factors.setThreshold(resolved);
+    factors.compute(slope * scale.asDiagonal());
+    return scale.cwiseProduct(factors.solve(change));
+}
+
+}  // namespace
+
+Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    Study wide = study;
+    for (Experiment& experiment : wide.experiments) {
+        experiment.scene.model.cell *= 2.0;
+        experiment.scene.solver.extrapolate = false;
+    }
+    const Forward simulation = [](const Scene& scene, const std::atomic<bool>* end) {
+        SimulateOptions options;
+        options.stop_requested = end;
+        return simulate(scene, options);
+    };
+    return StudyModel(wide, simulation, solver_resolution, stop).at(values, 1);
+}
+
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window) {
+    const Eigen::VectorXd values = model.box().values(best.x);
+    Evaluation here = *best.evaluation;
+    const std::vector<FitResidual> before = model.residuals(here);
+    model.set_resolution(model.likely_resolution(wide, solver_resolution));
+    model.weigh(here, values);
+    model.weigh(wide, values);
+    const std::vector<FitResidual> after = model.residuals(here);
+    std::map<std::string, double> share;
+    for (const Experiment& experiment : study.experiments) {
+        share[experiment.name] = share_of_grids(experiment.scene);
+    }
+    Eigen::VectorXd change = wide.residuals - here.residuals;
+    Eigen::MatrixXd slope = about.slope;
+    for (std::size_t i = 0; i < before.size(); ++i) {  // priors, which follow, know of no grid
+        const auto row = static_cast<Eigen::Index>(i);
+        slope.row(row) *= before[i].sigma / after[i].sigma;
+        change[row] *= share.at(before[i].experiment);
+    }
+    return window.width().cwiseProduct(least_squares(slope, change));
+}
+
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {
+    Eigen::VectorXd own(box.size());  // in the parameters' units
+    std::vector<std::string> told;
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        FittedParameter& parameter = fit.parameters[static_cast<std::size_t>(j)];
+        const double unit = box.parameters()[static_cast<std::size_t>(j)].unit_factor;
+        double& end = left[j] < 0 ? parameter.lower_95 : parameter.upper_95;
+        end = box.value(j, box.share(j, end * unit) + left[j]) / unit;
+        own[j] = box.slope(j, x[j]) / unit * left[j];
+        told.push_back(fmt::format("'{}' {:+.2g} %", parameter.name, 100 * (box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1)));
+    }
+    const Eigen::VectorXd of_data = fit.covariance.diagonal();
+    fit.covariance += own * own.transpose() / 3.0;  // the mean square of what is spread evenly from 0 to 1
+    const Eigen::VectorXd sd = fit.covariance.diagonal().cwiseSqrt();
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        fit.parameters[static_cast<std::size_t>(j)].standard_error = sd[j];
+    }
+    fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
+    const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
+    fit.message += fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. Intervals take that in "
+                               "on its side; it makes up to {:.0f} % of a variance. ",
+                               fmt::join(told, ", "), 100 * most);
+}
+
+}  // namespace crampfit

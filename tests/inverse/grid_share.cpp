@@ -1,0 +1,85 @@
+#include "inverse/grid_share.hpp"
+#include "inverse/differences.hpp"
+#include "tests/inverse/fake_wedge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::testing {
+namespace {
+
+// What the grid is to be told of; curves are those of the fake wedge.
+Scene walked(bool extrapolates) {
+    Scene scene;
+    scene.model = {.plane = PlaneCondition::strain, .thickness = 10e-3, .cell = 0.2e-3};
+    scene.specimen.size = {10e-3, 8e-3};
+    scene.specimen.material = "EW";
+    scene.materials["EW"] = {400e6, 0.33, 300, 100};
+    scene.materials["LW"] = {4000e6, 0.33, 750, 100};
+    scene.edges = {{"top", Side::top, {}, {0.0, 1e-5}, {}, {}}, {"bottom", Side::bottom, {}, {0.0, 0.0}, {}, {}}};
+    Crack crack;
+    crack.points = {Vec2(0, 4e-3), Vec2(2e-3, 4e-3)};
+    crack.grows = Growth::end;
+    crack.advance = 0.4e-3;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 0.5e-3;
+    scene.solver.extrapolate = extrapolates;
+    return scene;
+}
+
+// Where cells twice as wide answer at the best point as this grid does so far off, their fit lies as far off on the other side, and as much is
+// left on this one: of a plain grid all of it, of two that have been extrapolated three quarters.
+TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
+    const Eigen::Vector2d off(-0.01, 0.004);
+    for (const bool extrapolates : {false, true}) {
+        Study study = wedge_study(FakeWedge{.sharpness = 1.0});
+        study.experiments[0].scene = walked(extrapolates);
+        const StudyModel model(study, [](const Scene& scene, const std::atomic<bool>*) { return FakeWedge{.sharpness = 1.0}(scene); }, 0.0, nullptr);
+        Objective objective(2, [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); }, 1000, 1);
+        const double width = std::log(400.0 / 20.0);
+        objective.at(Eigen::Vector2d(std::log(true_earlywood / 20) / width, std::log(true_latewood / 20) / width));
+        const crampfit::Run best = *objective.best();
+        const Uncertainty about = estimate_uncertainty(objective, model.curve_lengths(), {"EW", "LW"}, difference_step);
+        ASSERT_EQ(about.best.x, best.x);
+        Evaluation wide = *best.evaluation;
+        const auto stations = model.residuals(wide);
+        const Eigen::VectorXd change = about.slope * off;
+        for (Eigen::Index i = 0; i < change.size(); ++i) {
+            wide.modelled[i] += stations[static_cast<std::size_t>(i)].sigma * change[i];
+        }
+        const Eigen::VectorXd left = left_by_grid(study, model, best, wide, about, Window(best.x, 1.0));
+        const double share = extrapolates ? 0.75 : 1.0;
+        std::printf("left %.6f %.6f of %.6f %.6f\n", left[0], left[1], off[0], off[1]);
+        EXPECT_NEAR(left[0], share * off[0], 1e-8);
+        EXPECT_NEAR(left[1], share * off[1], 1e-8);
+    }
+}
+
+TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
+    const UnitBox box(wedge_study(FakeWedge{}).parameters);
+    const Eigen::Vector2d x(0.5, 0.4), left(0.03, -0.06);
+    Fit fit;
+    for (int j = 0; j < 2; ++j) {
+        fit.parameters.push_back({.name = "", .key = "", .value = box.value(j, x[j]), .unit = "", .lower_95 = box.value(j, x[j] - 0.1), .upper_95 = box.value(j, x[j] + 0.1)});
+    }
+    fit.covariance = Eigen::Vector2d(4, 9).asDiagonal();
+    take_in_grid(fit, box, x, left);
+    EXPECT_DOUBLE_EQ(fit.parameters[0].lower_95, box.value(0, 0.4));
+    EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.63), 1e-9);
+    EXPECT_NEAR(fit.parameters[1].lower_95, box.value(1, 0.24), 1e-9);
+    EXPECT_DOUBLE_EQ(fit.parameters[1].upper_95, box.value(1, 0.5));
+    // Evenly between 0 and d: the mean square is d^2 / 3, and of two that go together d e / 3.
+    const double d = 0.03 * box.slope(0, 0.5), e = -0.06 * box.slope(1, 0.4);
+    EXPECT_NEAR(fit.covariance(0, 0), 4 + d * d / 3, 1e-9);
+    EXPECT_NEAR(fit.covariance(1, 1), 9 + e * e / 3, 1e-9);
+    EXPECT_NEAR(fit.covariance(0, 1), d * e / 3, 1e-9);
+    EXPECT_NEAR(fit.parameters[1].standard_error, std::sqrt(9 + e * e / 3), 1e-9);
+    EXPECT_NEAR(fit.correlation(0, 1), fit.covariance(0, 1) / std::sqrt(fit.covariance(0, 0) * fit.covariance(1, 1)), 1e-12);
+    EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace crampfit::testing
