@@ -65,14 +65,21 @@ struct Round {
 double shorter_side(cv::Size picture) { return std::min(picture.width, picture.height); }
 
 /// Before anything is known.
-OrientationScale first_scale(cv::Size picture) { return {2, std::clamp(shorter_side(picture) / 10, 6.0, 60.0)}; }
+OrientationScale first_scale(cv::Size picture) {
+    const double window = std::clamp(shorter_side(picture) / 10, 6.0, 60.0);
+    return {2, {window, window}};
+}
 
-/// Derivatives well within a ring, gathered over half a ring to either side, or more where rings are fine: noise. Without
-/// a ring width the middle between fine and coarse.
-OrientationScale scale_for(double ring_width, cv::Size picture) {
-    if (!(ring_width > 0))
-        return {2, std::clamp(shorter_side(picture) / 25, 6.0, 60.0)};
-    return {std::clamp(0.05 * ring_width, 1.0, 4.0), std::max({4.0, 0.5 * ring_width, shorter_side(picture) / 40})};
+/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along them, where they
+/// wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
+OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
+    if (!(ring_width > 0)) {
+        const double window = std::clamp(shorter_side(frame.size()) / 25, 6.0, 60.0);
+        return {2, {window, window}};
+    }
+    const double least = std::max(4.0, shorter_side(frame.size()) / 100);
+    const double across = std::max(least, 0.5 * ring_width), along = std::max(least, 0.15 * ring_width);
+    return {std::clamp(0.05 * ring_width, 1.0, 4.0), frame.across() ? cv::Size2d(across, along) : cv::Size2d(along, across)};
 }
 
 /// Why no rings can be traced; empty where they can.
@@ -259,7 +266,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     const cv::Mat off = frame.turn(blank);
     const Round first = look(gray, bgr, off, shown(off), frame, first_scale(gray.size()), 0, options.borders);
     const cv::Mat valid = countable(first.features);
-    Round second = look(flatten(gray, valid), bgr, off, valid, frame, scale_for(first.ring_width, gray.size()), first.ring_width,
+    Round second = look(flatten(gray, valid), bgr, off, valid, frame, scale_for(first.ring_width, frame), first.ring_width,
                         options.borders);
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
@@ -272,7 +279,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
         classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
     }
     if (!options.direction.empty())
-        second.orientation = orientation_in(options.direction, pixels.gray.size(), scale_for(first.ring_width, gray.size()));
+        second.orientation = orientation_in(options.direction, pixels.gray.size(), scale_for(first.ring_width, frame));
     fill_maps(specimen, second, classes, frame);
     if (options.density)
         fill_density(specimen, image, *options.density, result.notes);

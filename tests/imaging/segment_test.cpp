@@ -63,6 +63,7 @@ double distance_along(const BorderPolyline& border, double x, double y, bool gro
 struct Misses {
     std::vector<double> distance;  // of true vertices to the found border of their ring [pixels]
     int lost = 0;                  // true vertices that no found border passes
+    long invented = 0;             // found vertices that are 3 pixels from any true border
 };
 
 /// Borders that only cut a corner of the picture are not asked for.
@@ -72,7 +73,15 @@ bool crosses(const RingBorder& border, const EndGrain& grown) {
     return high->y() - low->y() > 0.5 * grown.rows * grown.truth.pixel;
 }
 
-/// Every true vertex at least 3 pixels within the picture against the found border nearest to it.
+bool near_a_border(const Eigen::Vector2d& vertex, const EndGrain& grown) {
+    const Vec2 place(vertex.x() + 0.5, grown.rows - 0.5 - vertex.y());  // [pixels]
+    return std::ranges::any_of(grown.borders, [&](const RingBorder& border) {
+        return std::ranges::any_of(border.points, [&](const Vec2& point) { return (point / grown.truth.pixel - place).norm() < 3; });
+    });
+}
+
+/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a border may end
+/// up to 6 pixels before.
 Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
     Misses misses;
     for (const RingBorder& border : grown.borders) {
@@ -88,10 +97,12 @@ Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
                     nearest = d;
             if (nearest < 10)
                 misses.distance.push_back(nearest);
-            else
+            else if (x >= 6 && x <= grown.columns - 7 && y >= 6 && y <= grown.rows - 7)
                 ++misses.lost;
         }
     }
+    for (const BorderPolyline& found : specimen.borders)
+        misses.invented += std::ranges::count_if(found.points, [&](const Eigen::Vector2d& vertex) { return !near_a_border(vertex, grown); });
     std::sort(misses.distance.begin(), misses.distance.end());
     return misses;
 }
@@ -179,8 +190,9 @@ TEST(VerificationSegment, EndGrainWithNoiseAndWaviness) {
                     "%.2f %% right; LW fraction worst %.2f %%\n", static_cast<int>(seed), specimen.borders.size(), static_cast<std::size_t>(crossing),
                     mean(misses.distance), at_share(misses.distance, 0.99), misses.distance.back(), misses.lost, 100 * share,
                     100 * worst_fraction);
-        EXPECT_EQ(static_cast<long>(specimen.borders.size()), crossing);
+        EXPECT_GE(static_cast<long>(specimen.borders.size()), crossing);  // others cut a corner
         EXPECT_EQ(misses.lost, 0);
+        EXPECT_EQ(misses.invented, 0);
         EXPECT_LT(at_share(misses.distance, 0.99), 1.0);
         EXPECT_GT(share, 0.97);
         EXPECT_LT(worst_fraction, 0.02);
@@ -242,9 +254,7 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
 }
 
 // Bars: all 25 borders, none invented, median 3 and worst 8 px from the given ones; ring widths within 3 %. The given
-// ones are whole pixels on one row, ours are means over the core's height. One ring of 24, the narrowest (45 px), misses the last bar by half a
-// percent: over a third of the height a stain stands in front of its LW, as dark as half of it, and the border follows the stain's edge by up
-// to 5 px. By gray a stain is no different from a ring that waves; so the mean over the rings is gated and the worst is printed.
+// ones are whole pixels on one row, which is up to 2.2 % of the narrowest ring; ours are means over the core's height.
 TEST(VerificationSegment, IncrementCore) {
     const auto image = wood / "mtreering_001.png";
     std::ifstream table(wood / "mtreering_001_ring_borders.csv");
@@ -283,7 +293,7 @@ TEST(VerificationSegment, IncrementCore) {
                 100 * width_errors.back());
     EXPECT_LT(at_share(errors, 0.5), 3);
     EXPECT_LT(errors.back(), 8);
-    EXPECT_LT(mean(width_errors), 0.03);
+    EXPECT_LT(width_errors.back(), 0.03);
 }
 
 // Counted by eye along x = 450 px: thirteen borders from the bark to the lower edge.
