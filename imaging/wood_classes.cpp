@@ -22,17 +22,16 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     cv::Mat smooth, missing;
     for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
-        const cv::Mat here = rings.bend(straight.gray);
         if (smooth.empty())
-            smooth = here;
+            smooth = straight.gray;
         else
-            here.copyTo(smooth, missing);
+            straight.gray.copyTo(smooth, missing);
         // A place whose neighbours along the ring hardly count is still to be filled.
-        missing = rings.bend(straight.known) < 0.3;
+        missing = straight.known < 0.3;
         if (cv::countNonZero(missing) == 0)
             break;
     }
-    return smooth;
+    return rings.bend(smooth);
 }
 
 /// Levels of one ring at some columns, a stretch of ring apart.
@@ -40,11 +39,11 @@ class RingLevels {
   public:
     RingLevels(const cv::Mat& gray, const cv::Mat& valid, const BorderLine& inner, const BorderLine& outer, int stretch) {
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
-        const int count = std::max(1, (to - from) / stretch);
+        const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
             std::vector<float> values;
-            for (int u = begin; u < end; ++u) {
+            for (int u = begin; u < end; u += step) {
                 if (!inner.covers(u) || !outer.covers(u))
                     continue;
                 for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
