@@ -103,7 +103,8 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
     const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
     for (const bool black : {true, false}) {
-        const cv::Mat colour = extreme_colour(gray, bgr, black);
+        cv::Mat colour;
+        cv::blur(extreme_colour(gray, bgr, black), colour, {5, 5});
         cv::Mat plain = even & (black ? cv::Mat(colour < blank_black) : cv::Mat(colour > blank_white));
         cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
         const cv::Size size = plain.size();
