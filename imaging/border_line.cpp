@@ -13,7 +13,7 @@ namespace {
 
 constexpr double least_known = 0.3;  // share of a place's surroundings that must count
 constexpr double least_rise = 0.4;   // of a border, against the others: of one that hardly shows, noise is the steepest
-constexpr double edge = 2;           // rows at the end of what is photographed where no slope can be told
+constexpr double edge = 3;           // rows at the end of what is photographed where no slope can be told
 
 /// The way through `gain` [band x columns] that gathers most, moving at most one row a column and paying for each.
 std::vector<int> best_way(const cv::Mat& gain) {
