@@ -150,7 +150,7 @@ std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
 
 struct GrayTracker::State {
     cv::Mat reference;
-    cv::Mat specimen;  // 0 on an even margin around it
+    cv::Mat specimen;  // 0 on an even dark ground around it
     cv::Mat allowed;   // 0 there and where masked
     double contrast = 0;
 };
@@ -160,7 +160,8 @@ GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::ui
     state->reference = pixels_of(reference);
     double brightest = 0;
     cv::minMaxLoc(state->reference, nullptr, &brightest);
-    state->specimen = find_blank(state->reference / std::max(brightest, 1.0), {}) == 0;
+    // Bright wood without any pattern is as even as a bright ground.
+    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
     state->allowed = state->specimen.clone();
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
