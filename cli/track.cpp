@@ -24,7 +24,9 @@ struct Arguments {
     std::string from = "auto";  // auto, fields or gray
 };
 
-/// The tip by the displacement field, by the picture's gray, or by the gray where the field shows none.
+constexpr double well_known = 0.2;  // of a subset: a tip whose place displacements tell no better is looked for as a dark line, too
+
+/// The tip by the displacement field, by the picture's gray, or by the gray where the field does not show it well.
 class TipFinder {
   public:
     TipFinder(const PictureSeries& pictures, const std::string& from, const CommonOptions& common)
@@ -39,10 +41,11 @@ class TipFinder {
         CrackTip tip;
         if (by_fields_)
             tip = find_crack_tip(geometry_, correlator_.field(image));
-        if (!gray_ || (by_fields_ && tip.status == TipStatus::ok))
+        const bool found = tip.status == TipStatus::ok;
+        if (!gray_ || (found && tip.sigma < well_known * geometry_.subset))
             return tip;
         const CrackTip by_gray = gray_->tip(image);
-        const bool seen = by_gray.status == TipStatus::ok || by_gray.status == TipStatus::outside;
+        const bool seen = (by_gray.status == TipStatus::ok && !(found && tip.sigma < by_gray.sigma)) || by_gray.status == TipStatus::outside;
         from_gray_ += seen;
         return seen || !by_fields_ || tip.status == TipStatus::too_few_points ? by_gray : tip;
     }
@@ -113,7 +116,7 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
     add_picture_times(*verb, arguments->times);
     verb->add_option("--from", arguments->from,
-                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements show no crack")
+                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements do not show the tip well")
         ->check(CLI::IsMember({"auto", "fields", "gray"}))
         ->capture_default_str();
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};

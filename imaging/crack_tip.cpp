@@ -3,10 +3,12 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -164,9 +166,25 @@ bool tears(const Line& line, const std::vector<Vec2>& torn, double width) {
     return static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
 }
 
-/// The line through the torn subsets. The last of them reaches over the tip by up to half its width: the tip is taken in between. `found`
-/// says which way the crack points.
-Line along_torn(const std::vector<Vec2>& torn, const Line& found, int subset) {
+/// The motion apart of what lies to either side of a place of the line, which has its origin there; none where nothing does.
+double jump_at(const std::vector<Sample>& samples, const Line& line, int subset) {
+    std::array<Vec2, 2> sum{Vec2::Zero(), Vec2::Zero()};
+    std::array<int, 2> count{0, 0};
+    const double width = clearance(subset, line.angle);
+    for (const Sample& sample : samples) {
+        const Vec2 local = line.local(sample.place);
+        if (std::abs(local.x()) > subset || std::abs(local.y()) < width || std::abs(local.y()) > width + subset)
+            continue;
+        const std::size_t side = local.y() > 0;
+        sum[side] += sample.displacement;
+        ++count[side];
+    }
+    return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : 0;
+}
+
+/// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip by up to half its
+/// width: the tip is taken in between. None where the last is the last of the lattice: then the tip is farther on.
+std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<Sample>& samples, const FieldGeometry& geometry) {
     Vec2 middle = Vec2::Zero();
     for (const Vec2& place : torn)
         middle += place / static_cast<double>(torn.size());
@@ -174,12 +192,22 @@ Line along_torn(const std::vector<Vec2>& torn, const Line& found, int subset) {
     for (const Vec2& place : torn)
         spread += (place - middle) * (place - middle).transpose();
     Vec2 along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1);
-    if (along.dot(found.direction()) < 0)
-        along = -along;
-    double last = 0;
-    for (const Vec2& place : torn)
+    double first = 0, last = 0;
+    for (const Vec2& place : torn) {
+        first = std::min(first, along.dot(place - middle));
         last = std::max(last, along.dot(place - middle));
-    return {middle + (last - 0.25 * subset) * along, std::atan2(along.y(), along.x())};
+    }
+    const double angle = std::atan2(along.y(), along.x());
+    if (jump_at(samples, {middle + last * along, angle}, geometry.subset) > jump_at(samples, {middle + first * along, angle}, geometry.subset)) {
+        along = -along;
+        last = -first;
+    }
+    const PointLattice& lattice = geometry.lattice;
+    const Vec2 beyond = middle + (last + lattice.step) * along - Vec2(lattice.first_x, lattice.first_y);
+    const Vec2 extent = lattice.step * Vec2(lattice.columns - 1, lattice.rows - 1);
+    if (beyond.minCoeff() < 0 || (extent - beyond).minCoeff() < 0)
+        return std::nullopt;
+    return Line{middle + (last - 0.25 * geometry.subset) * along, std::atan2(along.y(), along.x())};
 }
 
 /// The best of a coarse grid of tips and directions.
@@ -327,8 +355,14 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     // In wood whose rings differ much in stiffness the series may fit better elsewhere than at the crack.
     const std::vector<Vec2> torn = torn_places(lattice, field);
     const bool missed = torn.size() >= least_torn && !tears(line, torn, clearance(geometry.subset, line.angle));
-    if (missed)
-        line = along_torn(torn, line, geometry.subset);
+    if (missed) {
+        const std::optional<Line> torn_line = along_torn(torn, samples, geometry);
+        if (!torn_line) {
+            found.status = TipStatus::outside;
+            return found;
+        }
+        line = *torn_line;
+    }
     const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 &&
                         line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);

@@ -21,7 +21,7 @@ constexpr double least_slender = 4;    // length over width
 constexpr double longest_gap = 30;     // in a line that is broken [px]
 constexpr double least_cosine = 0.8;   // of the turn that it may make there
 constexpr int heading = 25;            // of a line's last stretch, that says how it goes on [px]
-constexpr double at_border = 2 * tolerance;  // from here to the picture's border a line is taken to go on [px]
+constexpr double at_border = 2 * tolerance;  // from here to the border a line is taken to go on [px]
 
 cv::Mat disk(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 
@@ -70,19 +70,21 @@ Patches find_patches(const cv::Mat& excess, double least) {
     return patches;
 }
 
-/// What is darker, and what is brighter, than all of the reference within some pixels.
+/// What is darker, and what is brighter, than all of the reference that counts within some pixels.
 struct Contrast {
     Patches dark, bright;
     bool is_crack() const { return dark.score[dark.strongest] > stands_out * bright.score[bright.strongest]; }
 };
 
-Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& counts, double least, int within) {
-    cv::Mat lowest, highest;
-    cv::erode(before, lowest, disk(within));
-    cv::dilate(before, highest, disk(within));
+Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& counts, const cv::Mat& inner, double least, int within) {
+    cv::Mat lowest = before.clone(), highest = before.clone();
+    lowest.setTo(std::numeric_limits<float>::max(), counts == 0);  // a dark margin must not hide a crack that runs into it
+    highest.setTo(std::numeric_limits<float>::lowest(), counts == 0);
+    cv::erode(lowest, lowest, disk(within));
+    cv::dilate(highest, highest, disk(within));
     cv::Mat darker = lowest - now, brighter = now - highest;
-    darker.setTo(0, counts == 0);
-    brighter.setTo(0, counts == 0);
+    darker.setTo(0, inner == 0);
+    brighter.setTo(0, inner == 0);
     return {find_patches(darker, least), find_patches(brighter, least)};
 }
 
@@ -140,7 +142,23 @@ class Ways {
     cv::Mat cost_, came_;
 };
 
-double to_border(const cv::Point2d& p, cv::Size size) { return std::min({p.x, p.y, size.width - 1 - p.x, size.height - 1 - p.y}); }
+/// What the line lies in.
+struct Ground {
+    cv::Mat gray;  // of the reference
+    cv::Mat room;  // of each pixel to what does not count: the picture's border, a margin around the specimen, a mask [px]
+
+    double to_border(const cv::Point2d& p) const {
+        const int x = static_cast<int>(std::lround(p.x)), y = static_cast<int>(std::lround(p.y));
+        return cv::Rect({0, 0}, room.size()).contains({x, y}) ? room.at<float>(y, x) : 0;
+    }
+};
+
+Ground ground_of(const cv::Mat& gray, const cv::Mat& counts) {
+    cv::Mat padded, room;
+    cv::copyMakeBorder(counts, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+    cv::distanceTransform(padded, room, cv::DIST_L2, 5);
+    return {gray, room(cv::Rect({1, 1}, counts.size()))};
+}
 
 /// Means over `reach` points to either side, fewer near the ends.
 std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& way, int reach) {
@@ -163,13 +181,13 @@ double mean_of(const std::vector<double>& values, std::size_t from, std::size_t 
     return sum / static_cast<double>(to - from);
 }
 
-/// Where the set is widest at the picture's border; outside for a set that does not come near it. `corner` is the set's in the picture.
-cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, cv::Size picture) {
+/// Where the set is widest at the border; outside for a set that does not come near it. `corner` is the set's in the picture.
+cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, const Ground& ground) {
     cv::Point mouth(-1, -1);
     float widest = 0;
     for (int y = 0; y < to_rim.rows; ++y)
         for (int x = 0; x < to_rim.cols; ++x)
-            if (to_rim.at<float>(y, x) > widest && to_border(cv::Point(x, y) + corner, picture) <= at_border) {
+            if (to_rim.at<float>(y, x) > widest && ground.to_border(cv::Point(x, y) + corner) <= at_border) {
                 widest = to_rim.at<float>(y, x);
                 mouth = {x, y};
             }
@@ -178,13 +196,13 @@ cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, cv::Si
 
 /// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack does; else the
 /// end that is clearly wider; else the one nearer to the border.
-bool back_is_mouth(const DarkWay& way, const cv::Mat& ground, bool back_is_nearer) {
+bool back_is_mouth(const DarkWay& way, const cv::Mat& gray, bool back_is_nearer) {
     const auto beyond = [&](bool back) {
         const cv::Point2d end = back ? way.points.back() : way.points.front(), d = direction_at(way.points, back, heading);
         double darkest = INFINITY;
         for (int i = 2; i <= 12; ++i)
-            if (const cv::Point at = end + i * d; cv::Rect({0, 0}, ground.size()).contains(at))
-                darkest = std::min<double>(darkest, ground.at<float>(at));
+            if (const cv::Point at = end + i * d; cv::Rect({0, 0}, gray.size()).contains(at))
+                darkest = std::min<double>(darkest, gray.at<float>(at));
         return darkest;
     };
     const double front = beyond(false), back = beyond(true);
@@ -197,15 +215,15 @@ bool back_is_mouth(const DarkWay& way, const cv::Mat& ground, bool back_is_neare
     return back_is_nearer;
 }
 
-/// The middle of what is set from one of its ends to the other, the mouth first; `ground` is the reference.
-DarkWay middle_of(const cv::Mat& set, const cv::Mat& ground) {
+/// The middle of what is set from one of its ends to the other, the mouth first.
+DarkWay middle_of(const cv::Mat& set, const Ground& ground) {
     const cv::Rect box = cv::boundingRect(set);
     const cv::Mat mask = set(box);
     cv::Mat padded, to_rim;
     cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::distanceTransform(padded, to_rim, cv::DIST_L2, 3);
     to_rim = to_rim(cv::Rect(1, 1, box.width, box.height));
-    const cv::Point mouth = mouth_at_border(to_rim, box.tl(), set.size());
+    const cv::Point mouth = mouth_at_border(to_rim, box.tl(), ground);
     cv::Point deepest;
     cv::minMaxLoc(to_rim, nullptr, nullptr, nullptr, &deepest, mask);
     const Ways ways(mask, to_rim, mouth.x >= 0 ? mouth : Ways(mask, to_rim, deepest).farthest());
@@ -214,9 +232,9 @@ DarkWay middle_of(const cv::Mat& set, const cv::Mat& ground) {
         way.points.emplace_back(p.x + box.x, p.y + box.y);
         way.half_width.push_back(to_rim.at<float>(p));
     }
-    const double front = to_border(way.points.front(), set.size()), back = to_border(way.points.back(), set.size());
+    const double front = ground.to_border(way.points.front()), back = ground.to_border(way.points.back());
     way.ends_inside = std::max(front, back) > at_border;
-    if (mouth.x < 0 && back_is_mouth(way, ground, back < front)) {
+    if (mouth.x < 0 && back_is_mouth(way, ground.gray, back < front)) {
         std::ranges::reverse(way.points);
         std::ranges::reverse(way.half_width);
     }
@@ -246,7 +264,7 @@ std::pair<cv::Point, int> next_patch(const Patches& patches, const std::vector<c
 }
 
 /// The strongest patch, and those that go on from its ends: where a crack passes through dark wood its line may be broken.
-cv::Mat join_patches(const Patches& patches, const cv::Mat& ground) {
+cv::Mat join_patches(const Patches& patches, const Ground& ground) {
     std::vector<char> taken(patches.score.size(), 0);
     taken[patches.strongest] = 1;
     cv::Mat joined = patches.numbers == patches.strongest;
@@ -267,8 +285,8 @@ cv::Mat join_patches(const Patches& patches, const cv::Mat& ground) {
     return joined;
 }
 
-/// The middle of the strongest line that has darkened, where it is long and slender; `ground` is the reference.
-std::optional<DarkWay> line_in(const Contrast& contrast, const cv::Mat& ground) {
+/// The middle of the strongest line that has darkened, where it is long and slender.
+std::optional<DarkWay> line_in(const Contrast& contrast, const Ground& ground) {
     if (contrast.dark.strongest == 0)
         return std::nullopt;
     const cv::Mat joined = join_patches(contrast.dark, ground);
@@ -293,8 +311,9 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     cv::GaussianBlur(seen, now, {}, 1.0);
     cv::erode(counts, inner, disk(tolerance));
     const double least = std::max(least_dark * robust_deviation(now - before, inner), least_share * cv::mean(before, inner)[0]);
-    const Contrast contrast = compare(before, now, inner, least, tolerance);
-    const std::optional<DarkWay> way = line_in(contrast, before);
+    const Ground ground = ground_of(before, counts);
+    const Contrast contrast = compare(before, now, counts, inner, least, tolerance);
+    const std::optional<DarkWay> way = line_in(contrast, ground);
     if (!way)
         return std::nullopt;
     // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well. Where the
@@ -303,9 +322,9 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     const bool apart = opened > tolerance && !way->ends_inside;
     if (!apart && contrast.is_crack())
         return way;
-    const Contrast farther = compare(before, now, inner, least, tolerance + opened);
+    const Contrast farther = compare(before, now, counts, inner, least, tolerance + opened);
     if (apart && farther.is_crack())
-        if (const std::optional<DarkWay> clear = line_in(farther, before))
+        if (const std::optional<DarkWay> clear = line_in(farther, ground))
             return clear;
     return contrast.is_crack() || farther.is_crack() ? way : std::nullopt;
 }

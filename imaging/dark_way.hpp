@@ -11,7 +11,7 @@ namespace crampfit {
 struct DarkWay {
     std::vector<cv::Point2d> points;  // from the mouth to where it is lost, about a pixel apart [px]
     std::vector<double> half_width;   // at each point [px]
-    bool ends_inside = true;          // false: it runs from border to border
+    bool ends_inside = true;          // false: it runs from border to border of what counts
 };
 
 /// The direction in which a line ends at its back or its front, over its last `reach` points.

@@ -16,6 +16,7 @@ constexpr double too_green = 0.04; // green above red and blue
 constexpr double blank_black = 0.08, blank_white = 0.92;  // of the brightest in the picture, in each colour
 constexpr double blank_grain = 0.012;                     // largest standard deviation over a few pixels: wood has more
 constexpr double least_blank = 0.0005;                    // of the picture
+constexpr double most_within = 0.25;  // of blank's area, that is as plain elsewhere: more, and wood itself is
 
 double number(Feature feature) { return static_cast<double>(feature); }
 
@@ -102,16 +103,20 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
     const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
     for (const bool black : {true, false}) {
-        const cv::Mat colour = extreme_colour(gray, bgr, black);
+        cv::Mat colour;
+        cv::blur(extreme_colour(gray, bgr, black), colour, {5, 5});
         cv::Mat plain = even & (black ? cv::Mat(colour < blank_black) : cv::Mat(colour > blank_white));
         cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
         const cv::Size size = plain.size();
-        blank |= pick(plain, [&](const int* box) {
+        const cv::Mat around = pick(plain, [&](const int* box) {
             const bool left = box[cv::CC_STAT_LEFT] <= 4, top = box[cv::CC_STAT_TOP] <= 4;
             const bool right = box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] >= size.width - 4;
             const bool bottom = box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] >= size.height - 4;
             return (left || right) && (top || bottom) && box[cv::CC_STAT_AREA] > least_blank * static_cast<double>(size.area());
         });
+        const int area = cv::countNonZero(around);
+        if (cv::countNonZero(plain) - area <= most_within * area)
+            blank |= around;
     }
     if (cv::countNonZero(blank) > 0)
         cv::dilate(blank, blank, disk(4));  // its blurred rim

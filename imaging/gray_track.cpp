@@ -1,6 +1,7 @@
 #include "imaging/gray_track.hpp"
 
 #include "imaging/closed_way.hpp"
+#include "imaging/foreign.hpp"
 #include "imaging/line_up.hpp"
 #include "imaging/opening.hpp"
 
@@ -52,6 +53,15 @@ double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
     if (d.y != 0)
         length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
     return std::max(length, 0.0);
+}
+
+/// How far it is from a place of the specimen to its edge, or to the picture's border [px].
+double to_edge(const cv::Point2d& from, const cv::Point2d& d, const cv::Mat& specimen) {
+    const double border = to_border(from, d, specimen.size());
+    for (double length = 0; length < border - 0.5; ++length)
+        if (specimen.at<std::uint8_t>(cv::Point(from + length * d)) == 0)
+            return length;
+    return border;
 }
 
 /// The picture along a line and `reach` pixels to either side [points of the line x 2 reach + 1].
@@ -139,16 +149,22 @@ std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
 }  // namespace
 
 struct GrayTracker::State {
-    cv::Mat reference, allowed;  // allowed: 0 where masked
+    cv::Mat reference;
+    cv::Mat specimen;  // 0 on an even dark ground around it
+    cv::Mat allowed;   // 0 there and where masked
     double contrast = 0;
 };
 
 GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::uint8_t>& mask) {
     auto state = std::make_unique<State>();
     state->reference = pixels_of(reference);
-    state->allowed = cv::Mat(reference.rows, reference.columns, CV_8U, cv::Scalar(255));
+    double brightest = 0;
+    cv::minMaxLoc(state->reference, nullptr, &brightest);
+    // Bright wood without any pattern is as even as a bright ground.
+    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
+    state->allowed = state->specimen.clone();
     if (!mask.empty())
-        state->allowed = cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
+        state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
     cv::Scalar mean, deviation;
     cv::meanStdDev(state->reference, mean, deviation, state->allowed);
     state->contrast = deviation[0];
@@ -185,7 +201,7 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     found.status = TipStatus::ok;
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);
-    found.length = to_border(way->points.front(), direction_at(way->points, false, heading), size) + tip->along;
+    found.length = to_edge(way->points.front(), direction_at(way->points, false, heading), state_->specimen) + tip->along;
     std::vector<cv::Point2d> points = closed_way(reference, image, weight, whole, *way);
     points.resize(points.size() > behind ? points.size() - behind : 0);
     points.insert(points.end(), tip->last.begin(), tip->last.end());

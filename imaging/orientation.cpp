@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -51,33 +52,37 @@ cv::Mat reduced(const cv::Mat& pixels, int step) {
 /// Gaussian-weighted moments of order up to 2 about each point.
 class Moments {
   public:
-    explicit Moments(double sigma) {
-        const int half = static_cast<int>(std::ceil(3 * sigma));
-        for (cv::Mat& kernel : kernels_)
-            kernel.create(1, 2 * half + 1, CV_32F);
-        for (int i = -half; i <= half; ++i) {
-            const double weight = std::exp(-0.5 * i * i / (sigma * sigma)), x = i / sigma;
-            for (int order = 0; order < 3; ++order)
-                kernels_[order].at<float>(i + half) = static_cast<float>(weight * std::pow(x, order));
-        }
-    }
-    /// Of x^a y^b, lengths in units of sigma.
+    /// Standard deviations along x and y [nodes].
+    explicit Moments(cv::Size2d sigma) : x_(kernels(sigma.width)), y_(kernels(sigma.height)) {}
+
+    /// Of x^a y^b, lengths in units of their sigma.
     cv::Mat operator()(const cv::Mat& values, int a, int b) const {
         cv::Mat out;
-        cv::sepFilter2D(values, out, CV_32F, kernels_[a], kernels_[b], {-1, -1}, 0, cv::BORDER_CONSTANT);
+        cv::sepFilter2D(values, out, CV_32F, x_[a], y_[b], {-1, -1}, 0, cv::BORDER_CONSTANT);
         return out;
     }
 
   private:
-    cv::Mat kernels_[3];
+    static std::array<cv::Mat, 3> kernels(double sigma) {
+        const int half = static_cast<int>(std::ceil(3 * sigma));
+        std::array<cv::Mat, 3> all;
+        for (int order = 0; order < 3; ++order) {
+            all[order].create(1, 2 * half + 1, CV_32F);
+            for (int i = -half; i <= half; ++i)
+                all[order].at<float>(i + half) = static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) * std::pow(i / sigma, order));
+        }
+        return all;
+    }
+
+    std::array<cv::Mat, 3> x_, y_;
 };
 
-int step_for(double integration) { return std::max(1, static_cast<int>(integration / 4)); }
+int step_for(cv::Size2d window) { return std::max(1, static_cast<int>(std::min(window.width, window.height) / 4)); }
 
 /// Length of the mean doubled vector, against the mean of its length.
-cv::Mat coherency_of(const Tensor& tensor, double integration) {
-    const int step = step_for(integration);
-    const Moments moments(integration / step);
+cv::Mat coherency_of(const Tensor& tensor, cv::Size2d window) {
+    const int step = step_for(window);
+    const Moments moments(window * (1.0 / step));
     const cv::Mat energy = moments(reduced(tensor.energy, step), 0, 0), c = moments(reduced(tensor.cos2, step), 0, 0),
                   s = moments(reduced(tensor.sin2, step), 0, 0);
     cv::Mat length, coherency;
@@ -88,20 +93,20 @@ cv::Mat coherency_of(const Tensor& tensor, double integration) {
 }
 
 /// The first-order fit of the doubled vector at each lattice node.
-OrientationField fit(const Tensor& tensor, double integration) {
+OrientationField fit(const Tensor& tensor, cv::Size2d window) {
     OrientationField field;
-    const int step = step_for(integration);
+    const int step = step_for(window);
     field.step = step;
     const cv::Mat energy = reduced(tensor.energy, step), c = reduced(tensor.cos2, step),
                   s = reduced(tensor.sin2, step);
-    const Moments moments(integration / step);
+    const Moments moments(window * (1.0 / step));
     const cv::Mat m00 = moments(energy, 0, 0), m10 = moments(energy, 1, 0), m01 = moments(energy, 0, 1),
                   m20 = moments(energy, 2, 0), m11 = moments(energy, 1, 1), m02 = moments(energy, 0, 2);
     const cv::Mat c0 = moments(c, 0, 0), c1 = moments(c, 1, 0), c2 = moments(c, 0, 1);
     const cv::Mat s0 = moments(s, 0, 0), s1 = moments(s, 1, 0), s2 = moments(s, 0, 1);
     for (cv::Mat* map : {&field.cos2, &field.sin2})
         *map = cv::Mat::zeros(energy.size(), CV_32F);
-    field.coherency = coherency_of(tensor, integration);
+    field.coherency = coherency_of(tensor, window);
     for (int j = 0; j < energy.rows; ++j) {
         for (int i = 0; i < energy.cols; ++i) {
             const auto at = [i, j](const cv::Mat& map) { return static_cast<double>(map.at<float>(j, i)); };
@@ -126,11 +131,11 @@ OrientationField fit(const Tensor& tensor, double integration) {
 }
 
 /// Where gradients disagree the doubled vector of around is taken, weighted by coherency.
-void fill_in(OrientationField& field, double integration) {
+void fill_in(OrientationField& field, cv::Size2d window) {
     cv::Mat sum_c, sum_s;
-    const double sigma = 2 * integration / field.step;
-    cv::GaussianBlur(field.cos2.mul(field.coherency), sum_c, {}, sigma, sigma, cv::BORDER_REFLECT);
-    cv::GaussianBlur(field.sin2.mul(field.coherency), sum_s, {}, sigma, sigma, cv::BORDER_REFLECT);
+    const cv::Size2d sigma = window * (2 / field.step);
+    cv::GaussianBlur(field.cos2.mul(field.coherency), sum_c, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
+    cv::GaussianBlur(field.sin2.mul(field.coherency), sum_s, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
     const double all_c = cv::sum(field.cos2.mul(field.coherency))[0],
                  all_s = cv::sum(field.sin2.mul(field.coherency))[0];
     const double all = std::hypot(all_c, all_s);
@@ -176,12 +181,12 @@ cv::Mat OrientationField::full(const cv::Mat& lattice, cv::Size picture) const {
 
 OrientationField measure_orientation(const cv::Mat& gray, const cv::Mat& valid, const OrientationScale& scale) {
     Tensor tensor = gradients(gray, valid, scale.derivative);
-    OrientationField field = fit(tensor, 2 * scale.integration);
-    fill_in(field, 2 * scale.integration);
-    const cv::Mat coherency = coherency_of(tensor, scale.integration);
+    OrientationField field = fit(tensor, scale.window * 2.0);
+    fill_in(field, scale.window * 2.0);
+    const cv::Mat coherency = coherency_of(tensor, scale.window);
     trust_agreeing(tensor, field);
-    field = fit(tensor, scale.integration);
-    fill_in(field, scale.integration);
+    field = fit(tensor, scale.window);
+    fill_in(field, scale.window);
     field.coherency = coherency;  // of what the picture shows, not of what was trusted
     return field;
 }

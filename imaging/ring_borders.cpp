@@ -1,5 +1,7 @@
 #include "imaging/ring_borders.hpp"
 
+#include "imaging/quantile.hpp"
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -16,55 +18,12 @@ constexpr double least_contrast = 0.3;    // of a place, against the picture's
 constexpr double least_support = 0.5;     // share of profiles that must show a border
 constexpr double nearness = 0.3;          // of neighbours, up to which a rise continues a border
 
-double quantile(std::vector<float> values, double share) {
-    if (values.empty())
-        return 0;
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
-}
-
-/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) / 12 add up to
-/// sigma^2 within 1 %.
-cv::Mat running_means(const cv::Mat& values, double sigma) {
-    constexpr int means = 3;
-    const int narrow = 2 * static_cast<int>((std::sqrt(12 * sigma * sigma / means + 1) - 1) / 2) + 1;
-    const double left = 12 * sigma * sigma - means * (narrow * narrow - 1.0);
-    const auto wider = std::clamp(std::lround(left / (4.0 * narrow + 4)), 0l, static_cast<long>(means));
-    const int beyond = means * (narrow / 2 + 1);  // what a mean puts beyond the ends comes back with the next
-    cv::Mat out;
-    cv::copyMakeBorder(values, out, 0, 0, beyond, beyond, cv::BORDER_CONSTANT, 0);
-    for (int i = 0; i < means; ++i)
-        cv::blur(out, out, {i < wider ? narrow + 2 : narrow, 1}, {-1, -1}, cv::BORDER_CONSTANT);
-    return out.colRange(beyond, beyond + values.cols);
-}
-
-/// Gaussian along the rows; nothing beyond their ends.
-cv::Mat blur_along(const cv::Mat& values, double sigma) {
-    constexpr int band = 32;  // rows at a time: they stay in the cache
-    const int size = 2 * static_cast<int>(std::ceil(3 * sigma)) + 1;
-    cv::Mat out(values.size(), CV_32F);
-    cv::parallel_for_({0, (values.rows + band - 1) / band}, [&](const cv::Range& bands) {
-        for (int i = bands.start; i < bands.end; ++i) {
-            const cv::Range rows(band * i, std::min(values.rows, band * (i + 1)));
-            cv::Mat blurred;
-            if (sigma < 8)
-                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
-                                {-1, -1}, 0, cv::BORDER_CONSTANT);
-            else
-                blurred = running_means(values.rowRange(rows), sigma);
-            blurred.copyTo(out.rowRange(rows));
-        }
-    });
-    return out;
-}
-
 /// One column of the straightened picture.
 struct Profile {
     int column = 0;
     std::vector<float> gray;
     std::vector<char> known;
-    double first = 0, last = 0;  // rows at which what is photographed begins and ends; none where first > last
+    RowRange photographed;
 };
 
 /// A rise of gray in a profile.
@@ -77,13 +36,7 @@ struct Rise {
 Profile take_profile(const StraightPicture& straight, const RingCoordinate& rings, int column, double sigma, const cv::Mat& blank) {
     Profile profile;
     profile.column = column;
-    int top = 0, bottom = blank.rows - 1;
-    while (top < blank.rows && blank.at<std::uint8_t>(top, column))
-        ++top;
-    while (bottom > top && blank.at<std::uint8_t>(bottom, column))
-        --bottom;
-    profile.first = rings.psi(column, top) - rings.lowest();
-    profile.last = rings.psi(column, bottom) - rings.lowest();
+    profile.photographed = photographed_rows(rings, blank, column);
     cv::Mat gray, known;
     const cv::Mat weight = straight.known.col(column).clone();
     cv::GaussianBlur(straight.gray.col(column).mul(weight), gray, {1, 0}, sigma, sigma, cv::BORDER_CONSTANT);
@@ -221,10 +174,8 @@ void join(std::vector<Track>& tracks, const std::vector<Rise>& rises, int profil
 /// than half of them is a chip or chance.
 double support_of(const Track& track, const std::vector<Profile>& profiles) {
     int within = 0;
-    for (std::size_t k = 0; k < profiles.size(); ++k) {
-        const double row = track.row_at(static_cast<double>(k));
-        within += row >= profiles[k].first && row <= profiles[k].last;
-    }
+    for (std::size_t k = 0; k < profiles.size(); ++k)
+        within += profiles[k].photographed.holds(track.row_at(static_cast<double>(k)));
     return static_cast<double>(track.profile.size()) / std::max(within, 1);
 }
 
@@ -262,67 +213,6 @@ std::vector<Track> keep(std::vector<Track> tracks, const std::vector<Profile>& p
     return chosen;
 }
 
-/// The way through `gain` [band x columns] that gathers most, moving at most one row a column and paying for each.
-std::vector<int> best_way(const cv::Mat& gain) {
-    constexpr float price = 0.3f;
-    cv::Mat sum = gain.clone(), from = cv::Mat::zeros(gain.size(), CV_8S);
-    for (int u = 1; u < gain.cols; ++u) {
-        for (int j = 0; j < gain.rows; ++j) {
-            float best = sum.at<float>(j, u - 1);
-            for (const int move : {-1, 1}) {
-                if (j + move < 0 || j + move >= gain.rows || sum.at<float>(j + move, u - 1) - price <= best)
-                    continue;
-                best = sum.at<float>(j + move, u - 1) - price;
-                from.at<schar>(j, u) = static_cast<schar>(move);
-            }
-            sum.at<float>(j, u) += best;
-        }
-    }
-    int j = 0;
-    for (int i = 1; i < gain.rows; ++i)
-        if (sum.at<float>(i, gain.cols - 1) > sum.at<float>(j, gain.cols - 1))
-            j = i;
-    std::vector<int> way(gain.cols);
-    for (int u = gain.cols - 1; u >= 0; --u) {
-        way[u] = j;
-        j += from.at<schar>(j, u);
-    }
-    return way;
-}
-
-/// Rows of the steepest rise in each column, within `reach` of a first guess.
-std::vector<double> lay(const cv::Mat& slope, const std::vector<double>& guess, int reach) {
-    const int columns = static_cast<int>(guess.size());
-    cv::Mat gain(2 * reach + 1, columns, CV_32F, cv::Scalar(0));
-    const auto row_of = [&](int u, int j) { return static_cast<int>(std::lround(guess[u])) + j - reach; };
-    std::vector<float> peaks;
-    for (int u = 0; u < columns; ++u) {
-        for (int j = 0; j < gain.rows; ++j)
-            if (const int row = row_of(u, j); row >= 0 && row < slope.rows)
-                gain.at<float>(j, u) = std::max(0.0f, slope.at<float>(row, u));
-        double peak = 0;
-        cv::minMaxLoc(gain.col(u), nullptr, &peak);
-        if (peak > 0)  // else there is nothing in this column, such as beside a specimen that is narrower than its picture
-            peaks.push_back(static_cast<float>(peak));
-    }
-    gain /= std::max(quantile(peaks, 0.5), 1e-6);
-    cv::min(gain, 1.5, gain);
-    const std::vector<int> way = best_way(gain);
-    cv::Mat rows(1, columns, CV_32F);
-    for (int u = 0; u < columns; ++u) {
-        const int row = row_of(u, way[u]);
-        double shift = 0;
-        if (row > 0 && row + 1 < slope.rows) {
-            const double a = slope.at<float>(row - 1, u), b = slope.at<float>(row, u), c = slope.at<float>(row + 1, u);
-            if (b > a && b >= c && b > 0)
-                shift = 0.5 * (a - c) / (a - 2 * b + c);  // a parabola's top
-        }
-        rows.at<float>(u) = static_cast<float>(row + shift);
-    }
-    cv::GaussianBlur(rows, rows, {0, 1}, 1.5, 1.5, cv::BORDER_REPLICATE);
-    return {rows.begin<float>(), rows.end<float>()};
-}
-
 /// Profiles across the rings, each a blurred stretch of them apart.
 std::vector<Profile> take_profiles(const StraightWood& wood, const cv::Mat& blank, const RingCoordinate& rings, double ring_width) {
     const double most = ring_width > 0 ? std::max(2.0, 0.4 * ring_width) : 20;
@@ -358,68 +248,24 @@ std::vector<Track> follow(const std::vector<Profile>& profiles, double ring_widt
     return tracks;
 }
 
-/// How gray rises down the columns of the finely straightened picture; 0 where that is not known.
-cv::Mat slope_across(const StraightWood& wood) {
-    const StraightPicture fine = wood.blurred_along(2.0);
-    cv::Mat smooth, slope, unknown;
-    cv::GaussianBlur(fine.gray, smooth, {1, 0}, 1.0, 1.0);
-    cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
-    cv::dilate(fine.known < least_known, unknown, cv::Mat::ones(5, 1, CV_8U));
-    slope.setTo(0, unknown);
-    return slope;
-}
-
-/// A border in the frame from its rows in the straightened picture; it ends at the picture's edge and where nothing
-/// counts any more.
-BorderLine in_frame(const std::vector<double>& row, const cv::Mat& valid, const RingCoordinate& rings) {
-    const int columns = static_cast<int>(row.size());
-    BorderLine line{.first = columns, .v = {}, .support = 0};
-    std::vector<double> place(columns);
-    int last = -1;
-    for (int u = 0; u < columns; ++u) {
-        place[u] = rings.v(u, rings.lowest() + row[u]);
-        const int v = static_cast<int>(std::lround(place[u]));
-        if (v < 0 || v >= valid.rows || valid.at<float>(v, u) == 0)
-            continue;
-        line.first = std::min(line.first, u);
-        last = u;
-    }
-    for (int u = line.first; u <= last; ++u)
-        line.v.push_back(std::clamp(place[u], 0.0, valid.rows - 1.0));
-    return line;
-}
-
-std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
-                                    const std::vector<Track>& tracks, std::size_t profiles) {
-    const cv::Mat slope = slope_across(wood);
-    std::vector<BorderLine> borders;
+/// Where each track is to be laid.
+std::vector<BorderGuess> guesses(const std::vector<Track>& tracks, int columns, std::size_t profiles) {
+    std::vector<BorderGuess> all;
     for (const Track& track : tracks) {
-        std::vector<double> guess(valid.cols);
-        for (int u = 0; u < valid.cols; ++u)
-            guess[u] = track.row_at((u + 0.5) * static_cast<double>(profiles) / valid.cols - 0.5);
-        const int reach = static_cast<int>(std::clamp(0.15 * track.room, 2.0, 15.0));
-        BorderLine line = in_frame(lay(slope, guess, reach), valid, rings);
-        line.support = track.support;
-        if (line.v.size() > 1)
-            borders.push_back(std::move(line));
+        BorderGuess& guess = all.emplace_back(std::vector<double>(columns), track.room, track.support);
+        for (int u = 0; u < columns; ++u)
+            guess.row[u] = track.row_at((u + 0.5) * static_cast<double>(profiles) / columns - 0.5);
     }
-    return borders;
+    return all;
 }
 
 }  // namespace
-
-StraightPicture StraightWood::blurred_along(double sigma) const {
-    StraightPicture straight;
-    straight.known = blur_along(known_, sigma);
-    straight.gray = blur_along(gray_, sigma) / cv::max(straight.known, 1e-6);
-    return straight;
-}
 
 std::vector<BorderLine> find_ring_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                           double ring_width) {
     const std::vector<Profile> profiles = take_profiles(wood, blank, rings, ring_width);
     const std::vector<Track> tracks = keep(follow(profiles, ring_width), profiles);
-    return lay_borders(wood, valid, rings, tracks, profiles.size());
+    return lay_borders(wood, valid, blank, rings, guesses(tracks, valid.cols, profiles.size()));
 }
 
 double typical_ring_width(const std::vector<BorderLine>& borders) {

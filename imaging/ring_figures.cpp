@@ -10,9 +10,15 @@ namespace {
 
 constexpr int vertex_spacing = 5;  // columns
 
+bool both_cover(const BorderLine& inner, const BorderLine& outer, int u) { return inner.covers(u) && outer.covers(u); }
+
 /// How steep both borders of a ring are on average about a column.
-double slope(const BorderLine& inner, const BorderLine& outer, int u, int from, int to, int reach) {
-    const int a = std::max(from, u - reach), b = std::min(to - 1, u + reach);
+double slope(const BorderLine& inner, const BorderLine& outer, int u, int reach) {
+    int a = u, b = u;
+    while (a > u - reach && both_cover(inner, outer, a - 1))
+        --a;
+    while (b < u + reach && both_cover(inner, outer, b + 1))
+        ++b;
     return b > a ? 0.5 * (inner.at(b) - inner.at(a) + outer.at(b) - outer.at(a)) / (b - a) : 0;
 }
 
@@ -25,7 +31,8 @@ BorderPolyline polyline_of(const BorderLine& line, std::int64_t ring, const Grow
         polyline.points.emplace_back(p.x, p.y);
     };
     for (int u = line.first; u < line.end() - 1; u += vertex_spacing)
-        add(u);
+        if (line.covers(u))
+            add(u);
     add(line.end() - 1);
     return polyline;
 }
@@ -63,10 +70,13 @@ std::vector<RingFigures> ring_figures(const std::vector<BorderLine>& borders, co
         const BorderLine &inner = borders[i - 1], &outer = borders[i];
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
         double width = 0;
-        long late = 0, wood = 0;
+        long columns = 0, late = 0, wood = 0;
         for (int u = from; u < to; ++u) {
+            if (!both_cover(inner, outer, u))
+                continue;
+            ++columns;
             const double along_growth = outer.at(u) - inner.at(u);
-            const double steep = slope(inner, outer, u, from, to, std::max(2, static_cast<int>(along_growth / 2)));
+            const double steep = slope(inner, outer, u, std::max(2, static_cast<int>(along_growth / 2)));
             width += along_growth / std::sqrt(1 + steep * steep);
             for (int v = static_cast<int>(std::floor(inner.at(u))) + 1; v <= outer.at(u); ++v) {
                 if (features.at<std::uint8_t>(v, u) != static_cast<int>(Feature::wood))
@@ -76,7 +86,7 @@ std::vector<RingFigures> ring_figures(const std::vector<BorderLine>& borders, co
             }
         }
         if (wood > 0)
-            rings.push_back({static_cast<std::int64_t>(i) + 1, width / (to - from),
+            rings.push_back({static_cast<std::int64_t>(i) + 1, width / static_cast<double>(columns),
                              static_cast<double>(late) / static_cast<double>(wood)});
     }
     return rings;

@@ -65,14 +65,21 @@ struct Round {
 double shorter_side(cv::Size picture) { return std::min(picture.width, picture.height); }
 
 /// Before anything is known.
-OrientationScale first_scale(cv::Size picture) { return {2, std::clamp(shorter_side(picture) / 10, 6.0, 60.0)}; }
+OrientationScale first_scale(cv::Size picture) {
+    const double window = std::clamp(shorter_side(picture) / 10, 6.0, 60.0);
+    return {2, {window, window}};
+}
 
-/// Derivatives well within a ring, gathered over half a ring to either side, or more where rings are fine: noise. Without
-/// a ring width the middle between fine and coarse.
-OrientationScale scale_for(double ring_width, cv::Size picture) {
-    if (!(ring_width > 0))
-        return {2, std::clamp(shorter_side(picture) / 25, 6.0, 60.0)};
-    return {std::clamp(0.05 * ring_width, 1.0, 4.0), std::max({4.0, 0.5 * ring_width, shorter_side(picture) / 40})};
+/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along them, where they
+/// wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
+OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
+    if (!(ring_width > 0)) {
+        const double window = std::clamp(shorter_side(frame.size()) / 25, 6.0, 60.0);
+        return {2, {window, window}};
+    }
+    const double least = std::max(4.0, shorter_side(frame.size()) / 100);
+    const double across = std::max(least, 0.5 * ring_width), along = std::max(least, 0.15 * ring_width);
+    return {std::clamp(0.05 * ring_width, 1.0, 4.0), frame.across() ? cv::Size2d(across, along) : cv::Size2d(along, across)};
 }
 
 /// Why no rings can be traced; empty where they can.
@@ -98,11 +105,9 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
 
 /// `blank` is what is no specimen whatever else is found.
 Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const cv::Mat& valid, const GrowthFrame& frame,
-           const OrientationScale& scale, double ring_width, const std::vector<BorderPolyline>& given) {
+           const OrientationField& orientation, double ring_width, const std::vector<BorderPolyline>& given) {
     Round round;
-    cv::Mat counts;
-    frame.turn_back(valid).convertTo(counts, CV_8U, 255);
-    round.orientation = measure_orientation(frame.turn_back(gray), counts, scale);
+    round.orientation = orientation;
     const RingCoordinate rings(round.orientation, frame);
     const StraightWood wood(gray, valid, rings);
     round.obstacle = obstacle(round.orientation);
@@ -131,8 +136,9 @@ cv::Mat shown(const cv::Mat& blank) {
     return counts;
 }
 
-GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const SegmentOptions& options, std::vector<std::string>& notes) {
-    const GrowthGuess guess = guess_growth(gray, shown(blank), measure_orientation(gray, blank == 0, first_scale(gray.size())));
+GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const OrientationField& orientation, const SegmentOptions& options,
+                     std::vector<std::string>& notes) {
+    const GrowthGuess guess = guess_growth(gray, shown(blank), orientation);
     if (!options.growth) {
         notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
         return guess.growth;
@@ -141,6 +147,59 @@ GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const SegmentOpt
         notes.push_back(fmt::format("growth {} as told, though the picture looks like {}, by {}", name(*options.growth),
                                     name(guess.growth), guess.reason));
     return *options.growth;
+}
+
+/// A picture as it is stored.
+struct View {
+    cv::Mat gray, bgr;  // float
+    cv::Mat blank;      // 255 where nothing is photographed
+
+    View reduced(double factor) const {
+        View small;
+        cv::resize(gray, small.gray, {}, factor, factor, cv::INTER_AREA);
+        if (!bgr.empty())
+            cv::resize(bgr, small.bgr, {}, factor, factor, cv::INTER_AREA);
+        cv::resize(blank, small.blank, small.gray.size(), 0, 0, cv::INTER_NEAREST);
+        return small;
+    }
+};
+
+/// What the first round is for.
+struct FirstLook {
+    GrowthAxis growth = GrowthAxis::right;
+    double ring_width = 0;  // [pixels]; 0: not found
+    cv::Mat valid;          // 1 where wood counts, in the frame
+};
+
+FirstLook look_first(const View& view, const SegmentOptions& options, std::vector<std::string>& notes) {
+    const OrientationField orientation = measure_orientation(view.gray, view.blank == 0, first_scale(view.gray.size()));
+    const GrowthAxis growth = growth_of(view.gray, view.blank, orientation, options, notes);
+    const GrowthFrame frame(growth, view.gray.size());
+    const cv::Mat bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr), blank = frame.turn(view.blank);
+    const Round round = look(frame.turn(view.gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
+    return {growth, round.ring_width, countable(round.features)};
+}
+
+/// Of a large picture some four million pixels tell as much as all, where rings are not too fine for that.
+FirstLook look_first_at_some(const View& view, const SegmentOptions& options, std::vector<std::string>& notes) {
+    constexpr double enough = 1 << 22, least_width = 12;  // pixels
+    const double factor = std::sqrt(enough / static_cast<double>(view.gray.total()));
+    if (factor < 1 && options.borders.empty()) {
+        std::vector<std::string> small_notes;
+        FirstLook look = look_first(view.reduced(factor), options, small_notes);
+        if (look.ring_width > least_width) {
+            notes.insert(notes.end(), small_notes.begin(), small_notes.end());
+            look.ring_width /= factor;
+            cv::resize(look.valid, look.valid, GrowthFrame(look.growth, view.gray.size()).size(), 0, 0, cv::INTER_NEAREST);
+            return look;
+        }
+    }
+    return look_first(view, options, notes);
+}
+
+/// Directions in the picture from what is turned into the frame.
+OrientationField orientation_in(const cv::Mat& gray, const cv::Mat& valid, const GrowthFrame& frame, const OrientationScale& scale) {
+    return measure_orientation(frame.turn_back(gray), frame.turn_back(valid) > 0, scale);
 }
 
 double pixel_of(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& notes) {
@@ -196,7 +255,7 @@ cv::Mat classes_by_gray(const std::filesystem::path& image, std::vector<GrayClas
 }
 
 /// The radial direction as another picture of the wood shows it.
-OrientationField orientation_in(const std::filesystem::path& image, cv::Size size, const OrientationScale& scale) {
+OrientationField orientation_of(const std::filesystem::path& image, cv::Size size, const OrientationScale& scale) {
     const PictureKey key{"command line", "--direction"};
     const Pixels pixels = read_float(image, key);
     if (pixels.gray.size() != size)
@@ -253,13 +312,12 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     specimen.rows = pixels.gray.rows;
     specimen.source = image.string();
     specimen.pixel = pixel_of(image, options, result.notes);
-    const cv::Mat blank = find_blank(pixels.gray, pixels.bgr);
-    const GrowthFrame frame(growth_of(pixels.gray, blank, options, result.notes), pixels.gray.size());
-    const cv::Mat gray = frame.turn(pixels.gray), bgr = pixels.bgr.empty() ? cv::Mat() : frame.turn(pixels.bgr);
-    const cv::Mat off = frame.turn(blank);
-    const Round first = look(gray, bgr, off, shown(off), frame, first_scale(gray.size()), 0, options.borders);
-    const cv::Mat valid = countable(first.features);
-    Round second = look(flatten(gray, valid), bgr, off, valid, frame, scale_for(first.ring_width, gray.size()), first.ring_width,
+    const View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    const FirstLook first = look_first_at_some(view, options, result.notes);
+    const GrowthFrame frame(first.growth, view.gray.size());
+    const cv::Mat gray = flatten(frame.turn(view.gray), first.valid), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
+    const OrientationScale scale = scale_for(first.ring_width, frame);
+    Round second = look(gray, bgr, frame.turn(view.blank), first.valid, frame, orientation_in(gray, first.valid, frame, scale), first.ring_width,
                         options.borders);
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
@@ -272,7 +330,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
         classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
     }
     if (!options.direction.empty())
-        second.orientation = orientation_in(options.direction, pixels.gray.size(), scale_for(first.ring_width, gray.size()));
+        second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
     fill_maps(specimen, second, classes, frame);
     if (options.density)
         fill_density(specimen, image, *options.density, result.notes);

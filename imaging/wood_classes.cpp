@@ -1,5 +1,7 @@
 #include "imaging/wood_classes.hpp"
 
+#include "imaging/quantile.hpp"
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -15,28 +17,21 @@ constexpr double dark_share = 0.03;    // of a ring, that is no brighter than pu
 constexpr double bright_share = 0.90;  // of a ring, that is no brighter than pure EW
 constexpr double mixed = 1.5;          // pixels on either side of a border that show some of the other side
 
-double quantile(std::vector<float>& values, double share) {
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
-}
-
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
 cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
     cv::Mat smooth, missing;
     for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
-        const cv::Mat here = rings.bend(straight.gray);
         if (smooth.empty())
-            smooth = here;
+            smooth = straight.gray;
         else
-            here.copyTo(smooth, missing);
+            straight.gray.copyTo(smooth, missing);
         // A place whose neighbours along the ring hardly count is still to be filled.
-        missing = rings.bend(straight.known) < 0.3;
+        missing = straight.known < 0.3;
         if (cv::countNonZero(missing) == 0)
             break;
     }
-    return smooth;
+    return rings.bend(smooth);
 }
 
 /// Levels of one ring at some columns, a stretch of ring apart.
@@ -44,14 +39,17 @@ class RingLevels {
   public:
     RingLevels(const cv::Mat& gray, const cv::Mat& valid, const BorderLine& inner, const BorderLine& outer, int stretch) {
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
-        const int count = std::max(1, (to - from) / stretch);
+        const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
             std::vector<float> values;
-            for (int u = begin; u < end; ++u)
+            for (int u = begin; u < end; u += step) {
+                if (!inner.covers(u) || !outer.covers(u))
+                    continue;
                 for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
                     if (valid.at<float>(v, u) > 0)
                         values.push_back(gray.at<float>(v, u));
+            }
             if (values.size() < 20)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
@@ -153,12 +151,18 @@ void remove_specks(cv::Mat& label, int one, int other, double least) {
 }  // namespace
 
 cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
-    cv::Mat numbers(frame, CV_32S, cv::Scalar(static_cast<double>(borders.size())));
-    std::vector<int> next(frame.width, 0);  // row of each column that no border before has passed
+    cv::Mat numbers(frame, CV_32S);
+    std::vector<int> next(frame.width, 0);     // row of each column that no border before has passed
+    std::vector<int> outside(frame.width, 0);  // number of what lies there
     for (std::size_t i = 0; i < borders.size(); ++i)
-        for (int u = std::max(0, borders[i].first); u < std::min(frame.width, borders[i].end()); ++u)
+        for (int u = std::max(0, borders[i].first); u < std::min(frame.width, borders[i].end()); ++u) {
             for (int& v = next[u]; v < frame.height && v <= borders[i].at(u); ++v)
                 numbers.at<int>(v, u) = static_cast<int>(i);
+            outside[u] = static_cast<int>(i) + 1;
+        }
+    for (int u = 0; u < frame.width; ++u)
+        for (int v = next[u]; v < frame.height; ++v)
+            numbers.at<int>(v, u) = outside[u];
     return numbers;
 }
 

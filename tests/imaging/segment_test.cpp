@@ -63,6 +63,7 @@ double distance_along(const BorderPolyline& border, double x, double y, bool gro
 struct Misses {
     std::vector<double> distance;  // of true vertices to the found border of their ring [pixels]
     int lost = 0;                  // true vertices that no found border passes
+    long invented = 0;             // found vertices that are 3 pixels from any true border
 };
 
 /// Borders that only cut a corner of the picture are not asked for.
@@ -72,7 +73,15 @@ bool crosses(const RingBorder& border, const EndGrain& grown) {
     return high->y() - low->y() > 0.5 * grown.rows * grown.truth.pixel;
 }
 
-/// Every true vertex at least 3 pixels within the picture against the found border nearest to it.
+bool near_a_border(const Eigen::Vector2d& vertex, const EndGrain& grown) {
+    const Vec2 place(vertex.x() + 0.5, grown.rows - 0.5 - vertex.y());  // [pixels]
+    return std::ranges::any_of(grown.borders, [&](const RingBorder& border) {
+        return std::ranges::any_of(border.points, [&](const Vec2& point) { return (point / grown.truth.pixel - place).norm() < 3; });
+    });
+}
+
+/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a border may end
+/// up to 6 pixels before.
 Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
     Misses misses;
     for (const RingBorder& border : grown.borders) {
@@ -88,10 +97,12 @@ Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
                     nearest = d;
             if (nearest < 10)
                 misses.distance.push_back(nearest);
-            else
+            else if (x >= 6 && x <= grown.columns - 7 && y >= 6 && y <= grown.rows - 7)
                 ++misses.lost;
         }
     }
+    for (const BorderPolyline& found : specimen.borders)
+        misses.invented += std::ranges::count_if(found.points, [&](const Eigen::Vector2d& vertex) { return !near_a_border(vertex, grown); });
     std::sort(misses.distance.begin(), misses.distance.end());
     return misses;
 }
@@ -165,7 +176,9 @@ TEST(VerificationSegment, EndGrainWithNoiseAndWaviness) {
             right += specimen.label[i] == (grown.degree[i] >= 0.5f ? 1 : 0);
         const double share = static_cast<double>(right) / static_cast<double>(specimen.label.size());
         // A ring's LW by the generator begins where the degree is 1; half way through the transition it is 1/2.
+        // A ring that is only seen in part, at the picture's edge, may have no truth of its width.
         double worst_fraction = 0;
+        long compared = 0;
         for (const RingFigures& ring : specimen.rings) {
             double nearest = 1;
             for (const GrowthRing& truth : grown.rings) {
@@ -173,14 +186,19 @@ TEST(VerificationSegment, EndGrainWithNoiseAndWaviness) {
                 if (std::abs(width / grown.truth.pixel - ring.width) < 2)
                     nearest = std::min(nearest, std::abs(truth.latewood_fraction + 0.5 * truth.transition / width - ring.latewood_fraction));
             }
+            if (nearest == 1)
+                continue;
+            ++compared;
             worst_fraction = std::max(worst_fraction, nearest);
         }
+        EXPECT_GE(compared, crossing - 1);
         std::printf("seed %d: %zu borders of %zu; border misses mean %.2f, 99 %% within %.2f, worst %.2f px, %d lost; classes "
                     "%.2f %% right; LW fraction worst %.2f %%\n", static_cast<int>(seed), specimen.borders.size(), static_cast<std::size_t>(crossing),
                     mean(misses.distance), at_share(misses.distance, 0.99), misses.distance.back(), misses.lost, 100 * share,
                     100 * worst_fraction);
-        EXPECT_EQ(static_cast<long>(specimen.borders.size()), crossing);
+        EXPECT_GE(static_cast<long>(specimen.borders.size()), crossing);  // others cut a corner
         EXPECT_EQ(misses.lost, 0);
+        EXPECT_EQ(misses.invented, 0);
         EXPECT_LT(at_share(misses.distance, 0.99), 1.0);
         EXPECT_GT(share, 0.97);
         EXPECT_LT(worst_fraction, 0.02);
@@ -241,10 +259,51 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
     }
 }
 
+// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; wavy ones have a wavy
+// direction, which is known: r + a sin(k theta r0) is constant along a ring. Bars of the orientation as above.
+TEST(VerificationSegment, DrawnRings) {
+    constexpr double period = 50, a = 2, k = 2 * pi / 140, r0 = 1400;
+    const cv::Size size(500, 400);
+    const cv::Point2d pith(-1200, 180);
+    const auto radius = [&](double x, double y) {
+        const double theta = std::atan2(y - pith.y, x - pith.x);
+        return std::hypot(x - pith.x, y - pith.y) + a * std::sin(k * theta * r0);
+    };
+    cv::Mat pixels(size, CV_8U);
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            int light = 0;  // of 5 x 5 places in the pixel
+            for (int i = 0; i < 25; ++i)
+                light += std::fmod(radius(x + (i % 5 - 2) / 5.0, y + (i / 5 - 2) / 5.0), period) < 0.7 * period;
+            pixels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(std::lround(light * 255 / 25.0));
+        }
+    const Specimen specimen = segment_pixels(pixels, {.growth = GrowthAxis::right}).specimen;
+    std::size_t crossing = 0;  // at the picture's middle row, three pixels within
+    for (int x = 4; x < size.width - 3; ++x)
+        crossing += std::floor(radius(x, 200) / period) > std::floor(radius(x - 1, 200) / period);
+    EXPECT_GE(specimen.borders.size(), crossing);  // others cut a corner
+    std::vector<double> misses;  // [px]
+    for (const BorderPolyline& border : specimen.borders)
+        for (const Eigen::Vector2d& point : border.points)
+            misses.push_back(std::abs(std::remainder(radius(point.x(), point.y()), period)));
+    std::sort(misses.begin(), misses.end());
+    std::vector<double> errors;  // [deg]
+    for (int y = 0; y < size.height; y += 5)
+        for (int x = 0; x < size.width; x += 5) {
+            const double dx = radius(x + 0.5, y) - radius(x - 0.5, y), dy = radius(x, y + 0.5) - radius(x, y - 0.5);
+            const double found = specimen.orientation[static_cast<std::size_t>(y) * specimen.columns + x];
+            errors.push_back(std::abs(std::remainder(found - std::atan2(-dy, dx), pi)) * 180 / pi);
+        }
+    std::sort(errors.begin(), errors.end());
+    std::printf("drawn rings: borders 99 %% within %.2f, worst %.2f px; direction mean %.2f, 95 %% within %.2f deg\n", at_share(misses, 0.99),
+                misses.back(), mean(errors), at_share(errors, 0.95));
+    EXPECT_LT(at_share(misses, 0.99), 1);
+    EXPECT_LT(mean(errors), 1);
+    EXPECT_LT(at_share(errors, 0.95), 3);
+}
+
 // Bars: all 25 borders, none invented, median 3 and worst 8 px from the given ones; ring widths within 3 %. The given
-// ones are whole pixels on one row, ours are means over the core's height. One ring of 24, the narrowest (45 px), misses the last bar by half a
-// percent: over a third of the height a stain stands in front of its LW, as dark as half of it, and the border follows the stain's edge by up
-// to 5 px. By gray a stain is no different from a ring that waves; so the mean over the rings is gated and the worst is printed.
+// ones are whole pixels on one row, which is up to 2.2 % of the narrowest ring; ours are means over the core's height.
 TEST(VerificationSegment, IncrementCore) {
     const auto image = wood / "mtreering_001.png";
     std::ifstream table(wood / "mtreering_001_ring_borders.csv");
@@ -283,7 +342,7 @@ TEST(VerificationSegment, IncrementCore) {
                 100 * width_errors.back());
     EXPECT_LT(at_share(errors, 0.5), 3);
     EXPECT_LT(errors.back(), 8);
-    EXPECT_LT(mean(width_errors), 0.03);
+    EXPECT_LT(width_errors.back(), 0.03);
 }
 
 // Counted by eye along x = 450 px: thirteen borders from the bark to the lower edge.
