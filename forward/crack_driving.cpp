@@ -29,6 +29,7 @@ LoadState weighted(const std::vector<const LoadState*>& states, const std::vecto
         sum.potential += w * s.potential;
         sum.power += w * s.power;
         sum.traction_work += w * s.traction_work;
+        sum.missed += w * s.missed;
         sum.dissipated += w * s.dissipated;
         sum.displacement += w * s.displacement;
         for (std::size_t d = 0; d < sum.reactions.size(); ++d) sum.reactions[d] += w * s.reactions[d];
@@ -66,6 +67,7 @@ LoadState scaled(const LoadState& state, double factor) {
     LoadState at = state;
     at.time *= factor;
     at.potential *= factor * factor;
+    at.missed *= factor * factor;
     at.power *= factor;
     at.traction_work *= factor;
     at.displacement *= factor;
@@ -136,6 +138,7 @@ void extrapolate(LoadState& fine, const LoadState& coarse) {
     improve(fine.potential, coarse.potential);
     improve(fine.power, coarse.power);
     improve(fine.traction_work, coarse.traction_work);
+    improve(fine.missed, coarse.missed);
     improve(fine.dissipated, coarse.dissipated);
     improve(fine.displacement, coarse.displacement);
     for (std::size_t d = 0; d < fine.reactions.size(); ++d) improve(fine.reactions[d], coarse.reactions[d]);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 #include <string>
@@ -49,8 +50,8 @@ struct Losses {
 
 class Unreliable : public ::testing::TestWithParam<const char*> {};
 
-// The lowest misfit is that of a simplex with time enough. One standard error of a parameter raises it by 1, and methods end that far
-// above it where no run fails too: of auto 0.5, of ceres 0.4.
+// The lowest misfit is that of a simplex with time enough. Methods that step by differences end a part of a standard error from it where no run
+// fails too.
 TEST_P(Unreliable, FitsComeToTheSameOptimum) {
     Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
     study.optimizer = {.method = "sbplx", .starts = 4, .max_runs = 2000};
@@ -67,7 +68,11 @@ TEST_P(Unreliable, FitsComeToTheSameOptimum) {
                     fit.misfit, lowest.misfit, name(fit.status));
         EXPECT_GT(losses.lost, 0);
         EXPECT_EQ(fit.status, FitStatus::converged);
-        EXPECT_LT(fit.misfit, lowest.misfit + 1);
+        for (std::size_t j = 0; j < fit.parameters.size(); ++j) {
+            const double off = (fit.parameters[j].value - lowest.parameters[j].value) / fit.parameters[j].standard_error;
+            std::printf("  %s off by %+.2f standard errors\n", fit.parameters[j].name.c_str(), off);
+            EXPECT_LT(std::abs(off), 1);
+        }
     }
 }
 
