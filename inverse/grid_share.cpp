@@ -20,6 +20,10 @@ namespace {
 // Of the largest, all columns being of length one: below that a slope is curvature.
 constexpr double resolved = 1e-3;
 
+// Of a parameter's value: farther off, the wide cells are not near enough to the truth for errors to go with a power of the cell, nor slopes at
+// the best point for the way there.
+constexpr double farthest_told = 0.1;
+
 // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
 double share_of_grids(const Scene& scene) { return KeptWalk(scene).extrapolates() ? 0.75 : 1.0; }
 
@@ -70,6 +74,12 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
 }
 
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        if (std::abs(box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1) > farthest_told) {
+            fit.message += "What the grid leaves is not told: a fit on cells twice as wide, which would tell it, goes too far off. ";
+            return;
+        }
+    }
     Eigen::VectorXd own(box.size());  // in the parameters' units
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {

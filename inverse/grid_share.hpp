@@ -26,7 +26,7 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window);
 
 /// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it as spread
-/// evenly up to there, squares about the best point. The message says it.
+/// evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value. The message says it.
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left);
 
 }  // namespace crampfit

@@ -25,7 +25,7 @@ class Curve;
 /// known to the rows' distance only, which counts as an error of its own.
 ///
 /// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer than it grows from
-/// row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over +- sigma_a. Where
+/// row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over sigma_a to the flatter side. Where
 /// growth jumps, starts or ends between two rows it is no less than the rows' distance, so that a jump has no infinite weight. Stations
 /// reached within one window, or in one jump, share their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger

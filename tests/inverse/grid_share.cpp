@@ -60,7 +60,7 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
 
 TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     const UnitBox box(wedge_study(FakeWedge{}).parameters);
-    const Eigen::Vector2d x(0.5, 0.4), left(0.03, -0.06);
+    const Eigen::Vector2d x(0.5, 0.4), left(0.01, -0.02);
     Fit fit;
     for (int j = 0; j < 2; ++j) {
         fit.parameters.push_back({.name = "", .key = "", .value = box.value(j, x[j]), .unit = "", .lower_95 = box.value(j, x[j] - 0.1), .upper_95 = box.value(j, x[j] + 0.1)});
@@ -68,17 +68,22 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     fit.covariance = Eigen::Vector2d(4, 9).asDiagonal();
     take_in_grid(fit, box, x, left);
     EXPECT_DOUBLE_EQ(fit.parameters[0].lower_95, box.value(0, 0.4));
-    EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.63), 1e-9);
-    EXPECT_NEAR(fit.parameters[1].lower_95, box.value(1, 0.24), 1e-9);
+    EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.61), 1e-9);
+    EXPECT_NEAR(fit.parameters[1].lower_95, box.value(1, 0.28), 1e-9);
     EXPECT_DOUBLE_EQ(fit.parameters[1].upper_95, box.value(1, 0.5));
     // Evenly between 0 and d: the mean square is d^2 / 3, and of two that go together d e / 3.
-    const double d = 0.03 * box.slope(0, 0.5), e = -0.06 * box.slope(1, 0.4);
+    const double d = 0.01 * box.slope(0, 0.5), e = -0.02 * box.slope(1, 0.4);
     EXPECT_NEAR(fit.covariance(0, 0), 4 + d * d / 3, 1e-9);
     EXPECT_NEAR(fit.covariance(1, 1), 9 + e * e / 3, 1e-9);
     EXPECT_NEAR(fit.covariance(0, 1), d * e / 3, 1e-9);
     EXPECT_NEAR(fit.parameters[1].standard_error, std::sqrt(9 + e * e / 3), 1e-9);
     EXPECT_NEAR(fit.correlation(0, 1), fit.covariance(0, 1) / std::sqrt(fit.covariance(0, 0) * fit.covariance(1, 1)), 1e-12);
     EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
+    // By more than a tenth of a value: no slope tells that.
+    const double before = fit.parameters[1].lower_95;
+    take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06));
+    EXPECT_EQ(fit.parameters[1].lower_95, before);
+    EXPECT_NE(fit.message.find("is not told"), std::string::npos);
 }
 
 }  // namespace
