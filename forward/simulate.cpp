@@ -117,7 +117,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
     read_probes(scene, walk, record);
-    if (!plan.rotates && plan.grows) judge_small_strain(scene, plan, materials, walk, record);
+    if (!plan.rotates && plan.grows && scene.solver.strain == StrainMeasure::automatic) judge_small_strain(scene, plan, materials, walk, record);
     return record;
 }
 
