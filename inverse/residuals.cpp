@@ -284,12 +284,13 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         }
         const double averaged =
             std::max(line_averages, 0.5 + rows.count(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
-        const double early = crack.arrival(length - noise).value_or(from);
-        const double late = crack.arrival(length + noise).value_or(to);
+        const double reach_of_length = noise * std::sqrt(line_averages / averaged);
+        const double early = crack.arrival(length - reach_of_length).value_or(from);
+        const double late = crack.arrival(length + reach_of_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
         const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
         const double of_length = std::max(*arrival - early, late - *arrival);  // just before a jump and behind it one side says little
-        station.sigma = std::max(std::hypot(of_length, abscissa_noise_) / std::sqrt(averaged), of_jump);
+        station.sigma = std::max(std::hypot(of_length / std::sqrt(line_averages), abscissa_noise_ / std::sqrt(averaged)), of_jump);
         station.sigma = std::hypot(station.sigma, model_resolution_ * *arrival);
         stations_.push_back(station);
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
