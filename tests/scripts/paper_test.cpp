@@ -163,6 +163,19 @@ TEST(SlowPaper, TrPlusForceRisesAndFallsAtLatewood) {
     }
 }
 
+// Boxes about the tip once took more energy off, along bands that lie askew, than an advance releases: the crack stopped for good.
+TEST(SlowPaper, TrMinusGoesThroughAtEquilibrium) {
+    double peak[2];
+    for (const int fine : {0, 1}) {
+        const Record record = run("tension_tr_minus", at_equilibrium, fine ? 0.1 : 0.2).record;
+        EXPECT_EQ(record.status, RunStatus::split);
+        const auto lower = [](const Instant& a, const Instant& b) { return a.force < b.force; };
+        peak[fine] = std::max_element(record.series.begin(), record.series.end(), lower)->force;
+    }
+    std::printf("TR-: peak %.1f N with cells of 0.2 mm, %.1f N with 0.1 mm\n", peak[0], peak[1]);
+    EXPECT_NEAR(peak[0], peak[1], 0.02 * peak[1]);
+}
+
 TEST(SlowPaper, TrMinusIsNotTheMirrorOfTrPlus) {
     for (const double speed : {at_equilibrium, 2.0, 5.0, 10.0, 20.0}) {
         const double plus = displacement_at_growth(run("tension_tr_plus", speed, 0.2).record);
