@@ -437,6 +437,10 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     return Outcome::not_converged;
 }
 
+void Equilibrium::refine() {
+    if (!plan_.friction && !plan_.remembers) take_step(newton_step(out_of_balance()));
+}
+
 double Equilibrium::strain_energy() const {
     double energy = internal_force_.energy(displacement_);
     for (const FieldPair& pair : cracks_.pairs)

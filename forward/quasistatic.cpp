@@ -357,6 +357,7 @@ bool Quasistatic::find(std::size_t number, int time) {
         return true;
     }
     if (good) {
+        if (!scene_.output.probes.places.empty()) equilibrium_.refine();
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
         keep(number, time, load_state());
         keep_probes(number, time);
