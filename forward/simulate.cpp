@@ -68,6 +68,13 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
+// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction hangs on
+// the way to a state, which is not gone again here.
+bool small_strain_is_a_guess(const Scene& scene, const Plan& plan, const Record& record) {
+    const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
+    return ended && plan.grows && !plan.rotates && !plan.friction && scene.solver.strain == StrainMeasure::automatic;
+}
+
 // Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest that the
 // edges go while the specimen carries a load.
 void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
@@ -75,7 +82,8 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
     constexpr double counts = 0.02;
     const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
     const double most = std::max_element(record.series.begin(), record.series.end(), lower)->strain_energy;
-    const auto last = std::find_if(record.series.rbegin(), record.series.rend(), [&](const Instant& row) { return row.strain_energy >= carries * most; });
+    const auto last = std::find_if(record.series.rbegin(), record.series.rend(),
+                                   [&](const Instant& row) { return row.strain_energy >= carries * most; });
     const SeriesPlace place{static_cast<std::size_t>(record.series.rend() - last - 1), 0.0};
     const auto power = [&](bool rotates) {
         Plan turned = plan;
@@ -117,7 +125,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
     read_probes(scene, walk, record);
-    if (!plan.rotates && plan.grows && scene.solver.strain == StrainMeasure::automatic) judge_small_strain(scene, plan, materials, walk, record);
+    if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, walk, record);
     return record;
 }
 
