@@ -3,6 +3,8 @@
 #include "forward/discretisation.hpp"
 #include "forward/friction.hpp"
 
+#include <array>
+#include <span>
 #include <vector>
 
 namespace crampfit {
@@ -10,6 +12,9 @@ namespace crampfit {
 /// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
 /// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each facet
 /// that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
+///
+/// Under a round body a facet goes with the mean of the surface about it, a cell wide: displacements are linear from node to node, and
+/// a wheel that fits itself into each bend at a node is tilted to and fro as it rolls, by 2 degrees with ten cells across.
 class SlidingBody {
   public:
     SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
@@ -35,6 +40,13 @@ class SlidingBody {
     /// All facets that the body, gone so far, pushes on.
     std::vector<Touch> touches(const Vec2& moved, const std::vector<Vec2>& displacement);
 
+    /// How a facet goes with the nodes that a point sees, one of several maybe.
+    struct Hold {
+        int point;
+        std::array<double, most_nodes> weight;
+    };
+    std::span<const Hold> holds(int facet) const { return {&holds_[first_hold_[facet]], &holds_[first_hold_[facet + 1]]}; }
+
     double stored_energy() const { return stored_energy_; }  // in the contact's springs at the last push [J]
     double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
 
@@ -52,10 +64,13 @@ class SlidingBody {
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
     double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
-    Vec2 current(const Facet& facet, const std::vector<Vec2>& displacement) const;
+    void find_holds();
+    Vec2 current(int facet, const std::vector<Vec2>& displacement) const;
 
     Shape shape_;
     const Discretisation& body_;
+    std::vector<Hold> holds_;        // by facet
+    std::vector<int> first_hold_;    // [facets + 1]
     std::vector<double> stiffness_;  // [facets] [N/m]
     std::vector<int> near_;          // facets that the body may touch before the list is made anew
     int age_ = 0;

@@ -247,36 +247,8 @@ void Equilibrium::add_lone_points() {
 void Equilibrium::add_touches(bool geometric) {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        for (const SlidingBody::Touch& touch : sliding_[i].touches(place_of(driver), displacement_)) {
-            const Facet& facet = body_.facets[touch.facet];
-            const auto fields = std::as_const(body_.points).node[facet.point];
-            const Mat2 normal = touch.normal * touch.normal.transpose();
-            const Mat2 along = Mat2::Identity() - normal;
-            const double turning = geometric ? touch.force * touch.curvature : 0.0;
-            const Mat2 stiffness = touch.stiffness * normal + (touch.drag.stiffness - turning) * along;
-            Eigen::Matrix<double, 8, 8> tangent;
-            for (int a = 0; a < 4; ++a)
-                for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = facet.weight[a] * facet.weight[b] * stiffness;
-            add_extra(body_.points.cell[facet.point], fields, tangent);
-            touched_cells_.push_back(body_.points.cell[facet.point]);
-            if (touch.drag.limit > 0.0) add_rubbing(fields, facet.weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
-            // The other end of the spring is the body.
-            std::array<int, 10> rows;
-            std::array<double, 10> steps{};
-            Eigen::Matrix<double, 10, 10> rest = Eigen::Matrix<double, 10, 10>::Zero();
-            for (int a = 0; a < 8; ++a) {
-                rows[a] = row_of(2 * fields[a / 2] + a % 2);
-                steps[a] = prescribed_step_[2 * fields[a / 2] + a % 2];
-                rest.block<1, 2>(a, 8) = -facet.weight[a / 2] * stiffness.row(a % 2);
-            }
-            rest.block<2, 8>(8, 0) = rest.block<8, 2>(0, 8).transpose();
-            rest.block<2, 2>(8, 8) = stiffness;
-            for (int axis = 0; axis < 2; ++axis) {
-                rows[8 + axis] = row_of_body(driver, axis);
-                steps[8 + axis] = still_to_go_[driver][axis];
-            }
-            couple(rows, steps, rest);
-        }
+        for (const SlidingBody::Touch& touch : sliding_[i].touches(place_of(driver), displacement_))
+            add_touch(sliding_[i], driver, touch, geometric);
     }
 }
 
@@ -303,6 +275,7 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     free_load_.setZero(equations_, free);
     free_stiffness_.setZero(free, free);
     rubbing_.clear();
+    spread_.clear();
     extra_.clear();
     lessons_.clear();
     add_lone_points();
@@ -319,7 +292,8 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
     };
-    return factor_.factor(assemble) && factor_.reciprocal_condition() > least_reciprocal_condition && border_tangent();
+    return factor_.factor(assemble) && factor_.reciprocal_condition() > least_reciprocal_condition && take_in_spread() &&
+           border_tangent();
 }
 
 double Equilibrium::largest_residual() const { return out_of_balance().lpNorm<Eigen::Infinity>(); }

@@ -2,11 +2,13 @@
 #include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace crampfit {
 
@@ -83,7 +85,7 @@ Eigen::VectorXd Equilibrium::out_of_balance() const {
 bool Equilibrium::border_tangent() {
     if (free_.empty()) return true;
     free_motion_ = free_load_;
-    factor_.solve(free_motion_);
+    solve_grid(free_motion_);
     const Eigen::MatrixXd schur = free_stiffness_ - free_load_.transpose() * free_motion_;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (schur + schur.transpose()));
     const double none = no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
@@ -98,7 +100,7 @@ bool Equilibrium::border_tangent() {
 
 Eigen::VectorXd Equilibrium::bordered_step(const Eigen::VectorXd& right) const {
     Eigen::MatrixXd grid = right.head(equations_);
-    factor_.solve(grid);
+    solve_grid(grid);
     if (free_.empty()) return grid;
     Eigen::VectorXd step(right.size());
     const Eigen::VectorXd bodies = free_yield_ * (right.tail(free_yield_.rows()) + free_load_.transpose() * grid.col(0));
@@ -110,19 +112,19 @@ Eigen::VectorXd Equilibrium::bordered_step(const Eigen::VectorXd& right) const {
 Eigen::VectorXd Equilibrium::remainder_of(const Eigen::VectorXd& step) const {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(step.size());
     for (const Rubbing& r : rubbing_) {
-        std::array<int, 10> rows;
-        std::array<double, 5> weight;
-        for (int a = 0; a < 5; ++a) {
-            weight[a] = a < 4 ? r.weight[a] : -1.0;
-            for (int axis = 0; axis < 2; ++axis)
-                rows[2 * a + axis] = a == 4 ? row_of_body(r.driver, axis) : r.fields[a] < 0 ? -1 : row_of(2 * r.fields[a] + axis);
-        }
+        const std::size_t fields = r.fields.size();
+        const auto weight = [&](std::size_t a) { return a < fields ? r.weight[a] : -1.0; };
+        const auto row = [&](std::size_t a, int axis) {
+            return a == fields ? row_of_body(r.driver, axis) : r.fields[a] < 0 ? -1 : row_of(2 * r.fields[a] + axis);
+        };
         Vec2 apart = Vec2::Zero();
-        for (int a = 0; a < 10; ++a)
-            if (rows[a] >= 0) apart[a % 2] += weight[a / 2] * step[rows[a]];
+        for (std::size_t a = 0; a <= fields; ++a)
+            for (int axis = 0; axis < 2; ++axis)
+                if (const int at = row(a, axis); at >= 0) apart[axis] += weight(a) * step[at];
         const Vec2 force = r.remainder * apart;
-        for (int a = 0; a < 10; ++a)
-            if (rows[a] >= 0) sum[rows[a]] += weight[a / 2] * force[a % 2];
+        for (std::size_t a = 0; a <= fields; ++a)
+            for (int axis = 0; axis < 2; ++axis)
+                if (const int at = row(a, axis); at >= 0) sum[at] += weight(a) * force[axis];
     }
     return sum;
 }
@@ -135,19 +137,114 @@ Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
 
 void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder) {
     if (remainder.isZero(0.0)) return;
-    Rubbing& rubbing = rubbing_.emplace_back(Rubbing{{}, {}, driver, remainder});
-    std::copy_n(fields.begin(), 4, rubbing.fields.begin());
-    std::copy_n(weight.begin(), 4, rubbing.weight.begin());
+    rubbing_.push_back({{fields.begin(), fields.end()}, {weight.begin(), weight.end()}, driver, remainder});
     // What is prescribed loads the others here too.
     Vec2 apart = driver < 0 ? Vec2::Zero() : Vec2(-still_to_go_[driver]);
-    for (int a = 0; a < 4; ++a)
+    for (std::size_t a = 0; a < fields.size(); ++a)
         for (int axis = 0; axis < 2 && fields[a] >= 0; ++axis) apart[axis] += weight[a] * prescribed_step_[2 * fields[a] + axis];
     const Vec2 force = remainder * apart;
     for (int axis = 0; axis < 2; ++axis) {
-        for (int a = 0; a < 4; ++a)
+        for (std::size_t a = 0; a < fields.size(); ++a)
             if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0) step_load_[row] -= weight[a] * force[axis];
         if (const int row = row_of_body(driver, axis); row >= 0) step_load_[row] += force[axis];
     }
+}
+
+// A spring between a body and what holds a facet.
+void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingBody::Touch& touch, bool geometric) {
+    std::vector<int> fields;
+    std::vector<double> weight;  // [fields]
+    const auto place = [&](int field) {
+        const auto at = std::find(fields.begin(), fields.end(), field) - fields.begin();
+        if (at == static_cast<std::ptrdiff_t>(fields.size())) {
+            fields.push_back(field);
+            weight.push_back(0.0);
+        }
+        return static_cast<std::size_t>(at);
+    };
+    const Points& points = body_.points;
+    const auto holds = rigid.holds(touch.facet);
+    for (const SlidingBody::Hold& hold : holds)
+        for (int k = 0; k < 4; ++k) weight[place(points.node[hold.point][k])] += hold.weight[k];
+    const Mat2 normal = touch.normal * touch.normal.transpose();
+    const Mat2 along = Mat2::Identity() - normal;
+    const double turning = geometric ? touch.force * touch.curvature : 0.0;
+    const Mat2 stiffness = touch.stiffness * normal + (touch.drag.stiffness - turning) * along;
+    if (touch.drag.limit > 0.0) add_rubbing(fields, weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
+
+    // The other end of the spring is the body.
+    const std::size_t size = 2 * fields.size();
+    std::vector<int> rows(size + 2);
+    std::vector<double> steps(size + 2);
+    Eigen::MatrixXd tangent(size + 2, size + 2);
+    weight.push_back(-1.0);
+    for (std::size_t a = 0; a < weight.size(); ++a) {
+        for (std::size_t b = 0; b < weight.size(); ++b) tangent.block<2, 2>(2 * a, 2 * b) = weight[a] * weight[b] * stiffness;
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+            const int dof = a < fields.size() ? 2 * fields[a] + static_cast<int>(axis) : -1;
+            rows[2 * a + axis] = dof < 0 ? row_of_body(driver, static_cast<int>(axis)) : row_of(dof);
+            steps[2 * a + axis] = dof < 0 ? still_to_go_[driver][axis] : prescribed_step_[dof];
+        }
+    }
+    couple(rows, steps, tangent);
+
+    // The factor takes up what joins the fields of one cell: all, or the same spring on the facet's own.
+    const Facet& facet = body_.facets[touch.facet];
+    const auto own = points.node[facet.point];
+    const bool is_all = holds.size() == 1;
+    const auto& own_weight = is_all ? holds[0].weight : facet.weight;
+    const Mat2 held = is_all ? stiffness : Mat2(touch.stiffness * normal + touch.drag.stiffness * along);
+    Eigen::Matrix<double, 8, 8> own_tangent;
+    for (int a = 0; a < 4; ++a)
+        for (int b = 0; b < 4; ++b) own_tangent.block<2, 2>(2 * a, 2 * b) = own_weight[a] * own_weight[b] * held;
+    const int cell = points.cell[facet.point];
+    extra_.emplace(cell, element(own, own_tangent));
+    touched_cells_.push_back(cell);
+    if (is_all) return;
+    for (int a = 0; a < 8; ++a)
+        for (int b = 0; b < 8; ++b) tangent(2 * place(own[a / 2]) + a % 2, 2 * place(own[b / 2]) + b % 2) -= own_tangent(a, b);
+    for (std::size_t a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
+    rows.resize(size);
+    spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size)});
+}
+
+// With M what is factored and R what is spread, on few unknowns P x, the inverse of M + P^T R P is M^-1 - M^-1 P^T W P M^-1, where
+// W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = P M^-1 P^T (Woodbury 1950). False where the sum is not positive definite.
+bool Equilibrium::take_in_spread() {
+    spread_rows_.clear();
+    for (const Spread& spread : spread_)
+        for (const int row : spread.rows)
+            if (row >= 0) spread_rows_.push_back(row);
+    std::sort(spread_rows_.begin(), spread_rows_.end());
+    spread_rows_.erase(std::unique(spread_rows_.begin(), spread_rows_.end()), spread_rows_.end());
+    if (spread_rows_.empty()) return true;
+    const auto size = static_cast<Eigen::Index>(spread_rows_.size());
+    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
+    for (const Spread& spread : std::exchange(spread_, {})) {
+        std::vector<Eigen::Index> at;
+        for (const int row : spread.rows)
+            at.push_back(row < 0 ? -1 : std::lower_bound(spread_rows_.begin(), spread_rows_.end(), row) - spread_rows_.begin());
+        for (std::size_t b = 0; b < at.size(); ++b)
+            for (std::size_t a = 0; a < at.size(); ++a)
+                if (at[a] >= 0 && at[b] >= 0) stiffness(at[a], at[b]) += spread.stiffness(a, b);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> yield(factor_.yield(spread_rows_));
+    if (yield.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd across = stiffness * Eigen::MatrixXd(yield.matrixL());  // R C
+    const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(size, size) + yield.matrixL().transpose() * across);
+    if (inner.info() != Eigen::Success) return false;
+    spread_change_ = stiffness - across * inner.solve(across.transpose());
+    return true;
+}
+
+// By the tangent, what rubs left out.
+void Equilibrium::solve_grid(Eigen::MatrixXd& right) const {
+    factor_.solve(right);
+    if (spread_rows_.empty()) return;
+    Eigen::MatrixXd change = Eigen::MatrixXd::Zero(right.rows(), right.cols());
+    change(spread_rows_, Eigen::all) = spread_change_ * right(spread_rows_, Eigen::all);
+    factor_.solve(change);
+    right -= change;
 }
 
 // Friction between the faces of a pair, on the left one.

@@ -22,6 +22,7 @@ Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     add_lone_points();
     add_pairs();
     add_touches(true);
+    spread_.clear();
     std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
     std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
     return step_load_;
@@ -41,7 +42,7 @@ std::vector<Equilibrium::Motion> Equilibrium::motions(const std::vector<std::vec
     if (!factor_tangent(true)) return {};
     Eigen::MatrixXd steps(equations_, drivers.size());
     for (std::size_t i = 0; i < drivers.size(); ++i) steps.col(i) = load_of(drivers[i]);
-    if (!drivers.empty()) factor_.solve(steps);
+    if (!drivers.empty()) solve_grid(steps);
     std::vector<Motion> found;
     for (std::size_t i = 0; i < drivers.size(); ++i) found.push_back(motion_of(drivers[i], steps.col(i)));
     return found;
@@ -51,7 +52,7 @@ Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
     Eigen::MatrixXd step = Eigen::VectorXd::Zero(equations_);
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (equation_[dof] >= 0) step(equation_[dof]) = load[dof / 2][dof % 2];
-    factor_.solve(step);
+    solve_grid(step);
     return motion_of(std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), step);
 }
 
@@ -119,9 +120,10 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
             const int stiffest = constants[0] >= constants[2] ? 0 : 1;
             for (std::size_t n = 0; n < numbers.size(); ++n) {
                 const double stiffer = numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
-                const Vec2 push = stiffer * touch.force * touch.normal;
                 slope.potential[n] += stiffer * touch.energy;
-                for (int k = 0; k < 4; ++k) add(n, points.node[facet.point][k], -facet.weight[k] * push);
+                const Vec2 push = stiffer * touch.force * touch.normal;
+                for (const SlidingBody::Hold& hold : sliding_[s].holds(touch.facet))
+                    for (int k = 0; k < 4; ++k) add(n, points.node[hold.point][k], -hold.weight[k] * push);
                 slope.drivers.col(n).segment<2>(2 * sliding_driver_[s]) += push;
             }
         }
@@ -134,7 +136,7 @@ std::vector<std::vector<Vec2>> Equilibrium::displacement_slopes(const Slopes& sl
     Eigen::MatrixXd step = Eigen::MatrixXd::Zero(equations_, numbers);
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (equation_[dof] >= 0) step.row(equation_[dof]) = -slopes.fields.row(dof);
-    factor_.solve(step);
+    solve_grid(step);
     std::vector<std::vector<Vec2>> found(numbers, std::vector<Vec2>(displacement_.size(), Vec2::Zero()));
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         for (int n = 0; n < numbers && equation_[dof] >= 0; ++n) found[n][dof / 2][dof % 2] = step(equation_[dof], n);

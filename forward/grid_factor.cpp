@@ -7,6 +7,7 @@
 #include <cmath>
 #include <future>
 #include <limits>
+#include <utility>
 
 extern "C" void dpotrf_(const char* triangle, const int* order, double* matrix, const int* leading, int* info);
 
@@ -393,6 +394,35 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 void GridFactor::solve(Eigen::MatrixXd& right) const {
     if (right.cols() > few_columns) return solve_columns(right);
     for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c).data());
+}
+
+// With A = L L^T these are the products of columns of L^-1.
+Eigen::MatrixXd GridFactor::yield(const std::vector<int>& equations) const {
+    const auto columns = static_cast<Eigen::Index>(equations.size());
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(columns, columns);
+    std::vector<Eigen::MatrixXd> left(boxes_.size());  // [border x columns] what each leaves for the box that it is a half of; empty: nothing
+    for (std::size_t b = 0; b < boxes_.size(); ++b) {
+        const Box& box = boxes_[b];
+        const int first = box.inner > 0 ? first_[box.nodes[0]] : 0;
+        const auto begin = std::lower_bound(equations.begin(), equations.end(), first);
+        const auto end = std::lower_bound(begin, equations.end(), first + box.inner);
+        const auto leaves_some = [&](int half) { return half >= 0 && left[half].size() > 0; };
+        if (begin == end && std::none_of(box.half.begin(), box.half.end(), leaves_some)) continue;
+        Eigen::MatrixXd front = Eigen::MatrixXd::Zero(box.inner + box.border, columns);
+        for (auto e = begin; e != end; ++e) front(*e - first, e - equations.begin()) = 1.0;
+        for (int h = 0; h < 2; ++h) {
+            if (!leaves_some(box.half[h])) continue;
+            const Eigen::MatrixXd from = std::exchange(left[box.half[h]], {});
+            Eigen::Index row = 0;
+            for (const int slot : box.slot[h])
+                for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) front.row(to) += from.row(row++);
+        }
+        auto own = front.topRows(box.inner);
+        box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
+        sum.noalias() += own.transpose() * own;
+        left[b] = front.bottomRows(box.border) - box.factor.bottomRows(box.border) * own;
+    }
+    return sum;
 }
 
 double GridFactor::reciprocal_condition() const {

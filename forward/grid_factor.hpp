@@ -43,6 +43,10 @@ class GridFactor {
     /// Solves for right sides [equations x any number], in place.
     void solve(Eigen::MatrixXd& right) const;
 
+    /// How the unknowns of these equations, in order, yield to unit forces on one another: the rows and columns of the inverse that
+    /// belong to them. Costs the boxes about them only.
+    Eigen::MatrixXd yield(const std::vector<int>& equations) const;
+
     /// A cheap estimate of 1 / condition number: (least / largest diagonal entry of the factor) squared.
     double reciprocal_condition() const;
 

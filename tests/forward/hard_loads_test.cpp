@@ -32,7 +32,8 @@ double slope_against_power(StaticTrial& run, double time) {
 }
 
 TEST(HardWheel, OnASharpCorner) {
-    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself.
+    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself, until
+    // the corner gives way to one side, at 0.62 mm on cells of 0.5 mm.
     for (const double cell : {0.5e-3, 0.2e-3}) {
         const double radius = 1e-3;
         Scene scene = at_rest({10e-3, 10e-3}, cell);
@@ -41,12 +42,12 @@ TEST(HardWheel, OnASharpCorner) {
         scene.bodies = {wheel("wheel", Vec2(0, 10e-3) + radius * out, radius, -1e-3 * out)};
         scene.measure = {"wheel", "wheel"};
         StaticTrial run(scene);
-        for (int k = 1; k <= 8; ++k) ASSERT_TRUE(run.solve(0.1 * k)) << k;
+        for (int k = 1; k <= 5; ++k) ASSERT_TRUE(run.solve(0.1 * k)) << k;
         const Vec2 push = push_of(run, 0);
         const std::string name = fmt::format("wheel on a sharp corner, {:.1f} mm cells", 1e3 * cell);
         EXPECT_GT(push.x(), 0.0);
         hard_case(name, "force along the diagonal: mirror symmetry", (push.x() + push.y()) / push.norm(), 1e-6);
-        hard_case(name, "slope of the potential is the power", slope_against_power(run, 0.8), 1e-3);
+        hard_case(name, "slope of the potential is the power", slope_against_power(run, 0.5), 1e-3);
     }
 }
 
