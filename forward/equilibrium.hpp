@@ -141,7 +141,6 @@ class Equilibrium {
     void add_touch(const SlidingBody& body, int driver, const SlidingBody::Touch& touch, bool geometric);
     void add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder);
     bool take_in_spread();
-    void solve_grid(Eigen::MatrixXd& right) const;
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
     Mat2 pair_stiffness(const FieldPair& pair) const;
@@ -228,14 +227,12 @@ class Equilibrium {
     Eigen::MatrixXd free_motion_;     // [equations x free] how the grid follows them
     Eigen::MatrixXd free_yield_;      // [free x free] how they yield to forces [m/N]
 
-    // Round bodies: their pushes are spread over more than a cell, which the factor cannot hold.
+    // Round bodies push on more than a cell at a time:
     struct Spread {
         std::vector<int> rows;        // equations
-        Eigen::MatrixXd stiffness;    // that the factor leaves out there [N/m]
+        Eigen::MatrixXd stiffness;    // that the cell does not hold [N/m]
     };
-    std::vector<Spread> spread_;      // of each touch
-    std::vector<int> spread_rows_;    // equations of all, in order
-    Eigen::MatrixXd spread_change_;   // W of M^-1 - M^-1 P^T W P M^-1, the inverse with them; M what is factored, P to those equations [N/m]
+    std::vector<Spread> spread_;      // of touches
 
     // Friction:
     struct Rubbing {                  // what the factor leaves out of the tangent at a place that rubs: it is not symmetric

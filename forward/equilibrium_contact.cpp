@@ -2,12 +2,12 @@
 #include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace crampfit {
@@ -85,7 +85,7 @@ Eigen::VectorXd Equilibrium::out_of_balance() const {
 bool Equilibrium::border_tangent() {
     if (free_.empty()) return true;
     free_motion_ = free_load_;
-    solve_grid(free_motion_);
+    factor_.solve(free_motion_);
     const Eigen::MatrixXd schur = free_stiffness_ - free_load_.transpose() * free_motion_;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (schur + schur.transpose()));
     const double none = no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
@@ -100,7 +100,7 @@ bool Equilibrium::border_tangent() {
 
 Eigen::VectorXd Equilibrium::bordered_step(const Eigen::VectorXd& right) const {
     Eigen::MatrixXd grid = right.head(equations_);
-    solve_grid(grid);
+    factor_.solve(grid);
     if (free_.empty()) return grid;
     Eigen::VectorXd step(right.size());
     const Eigen::VectorXd bodies = free_yield_ * (right.tail(free_yield_.rows()) + free_load_.transpose() * grid.col(0));
@@ -208,43 +208,22 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
     spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size)});
 }
 
-// With M what is factored and R what is spread, on few unknowns P x, the inverse of M + P^T R P is M^-1 - M^-1 P^T W P M^-1, where
-// W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = P M^-1 P^T (Woodbury 1950). False where the sum is not positive definite.
+// Into the factor.
 bool Equilibrium::take_in_spread() {
-    spread_rows_.clear();
-    for (const Spread& spread : spread_)
-        for (const int row : spread.rows)
-            if (row >= 0) spread_rows_.push_back(row);
-    std::sort(spread_rows_.begin(), spread_rows_.end());
-    spread_rows_.erase(std::unique(spread_rows_.begin(), spread_rows_.end()), spread_rows_.end());
-    if (spread_rows_.empty()) return true;
-    const auto size = static_cast<Eigen::Index>(spread_rows_.size());
-    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(size, size);
+    std::vector<int> rows;  // of all, in order
+    for (const Spread& spread : spread_) std::copy_if(spread.rows.begin(), spread.rows.end(), std::back_inserter(rows), [](int row) { return row >= 0; });
+    if (rows.empty()) return true;
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(rows.size(), rows.size());
     for (const Spread& spread : std::exchange(spread_, {})) {
-        std::vector<Eigen::Index> at;
-        for (const int row : spread.rows)
-            at.push_back(row < 0 ? -1 : std::lower_bound(spread_rows_.begin(), spread_rows_.end(), row) - spread_rows_.begin());
+        std::vector<std::ptrdiff_t> at;
+        for (const int row : spread.rows) at.push_back(row < 0 ? -1 : std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
         for (std::size_t b = 0; b < at.size(); ++b)
             for (std::size_t a = 0; a < at.size(); ++a)
                 if (at[a] >= 0 && at[b] >= 0) stiffness(at[a], at[b]) += spread.stiffness(a, b);
     }
-    const Eigen::LLT<Eigen::MatrixXd> yield(factor_.yield(spread_rows_));
-    if (yield.info() != Eigen::Success) return false;
-    const Eigen::MatrixXd across = stiffness * Eigen::MatrixXd(yield.matrixL());  // R C
-    const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(size, size) + yield.matrixL().transpose() * across);
-    if (inner.info() != Eigen::Success) return false;
-    spread_change_ = stiffness - across * inner.solve(across.transpose());
-    return true;
-}
-
-// By the tangent, what rubs left out.
-void Equilibrium::solve_grid(Eigen::MatrixXd& right) const {
-    factor_.solve(right);
-    if (spread_rows_.empty()) return;
-    Eigen::MatrixXd change = Eigen::MatrixXd::Zero(right.rows(), right.cols());
-    change(spread_rows_, Eigen::all) = spread_change_ * right(spread_rows_, Eigen::all);
-    factor_.solve(change);
-    right -= change;
+    return factor_.add_wide(rows, stiffness);
 }
 
 // Friction between the faces of a pair, on the left one.

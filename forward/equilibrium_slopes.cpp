@@ -42,7 +42,7 @@ std::vector<Equilibrium::Motion> Equilibrium::motions(const std::vector<std::vec
     if (!factor_tangent(true)) return {};
     Eigen::MatrixXd steps(equations_, drivers.size());
     for (std::size_t i = 0; i < drivers.size(); ++i) steps.col(i) = load_of(drivers[i]);
-    if (!drivers.empty()) solve_grid(steps);
+    if (!drivers.empty()) factor_.solve(steps);
     std::vector<Motion> found;
     for (std::size_t i = 0; i < drivers.size(); ++i) found.push_back(motion_of(drivers[i], steps.col(i)));
     return found;
@@ -52,7 +52,7 @@ Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
     Eigen::MatrixXd step = Eigen::VectorXd::Zero(equations_);
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (equation_[dof] >= 0) step(equation_[dof]) = load[dof / 2][dof % 2];
-    solve_grid(step);
+    factor_.solve(step);
     return motion_of(std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), step);
 }
 
@@ -136,7 +136,7 @@ std::vector<std::vector<Vec2>> Equilibrium::displacement_slopes(const Slopes& sl
     Eigen::MatrixXd step = Eigen::MatrixXd::Zero(equations_, numbers);
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (equation_[dof] >= 0) step.row(equation_[dof]) = -slopes.fields.row(dof);
-    solve_grid(step);
+    factor_.solve(step);
     std::vector<std::vector<Vec2>> found(numbers, std::vector<Vec2>(displacement_.size(), Vec2::Zero()));
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         for (int n = 0; n < numbers && equation_[dof] >= 0; ++n) found[n][dof / 2][dof % 2] = step(equation_[dof], n);

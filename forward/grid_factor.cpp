@@ -252,6 +252,7 @@ bool GridFactor::factor_within(int top, int forks, const Assemble& assemble) {
 }
 
 bool GridFactor::factor(const Assemble& assemble) {
+    wide_.clear();
     const bool good = factor_within(static_cast<int>(boxes_.size()) - 1, forks_, assemble);
     if (!good) mark_all();
     return good;
@@ -325,7 +326,8 @@ void GridFactor::backward_columns(const Eigen::MatrixXd& factor, double* y) {
 }
 
 // One right side.
-void GridFactor::solve_one(double* x) const {
+void GridFactor::solve_one(Eigen::Ref<Eigen::MatrixXd> right) const {
+    double* x = right.data();
     std::vector<std::size_t> at(boxes_.size() + 1, 0);
     for (std::size_t b = 0; b < boxes_.size(); ++b) at[b + 1] = at[b] + boxes_[b].inner + boxes_[b].border;
     std::vector<double> fronts(at.back());  // of each box: its own unknowns, then what it leaves for the box that it is a half of
@@ -340,11 +342,14 @@ void GridFactor::solve_one(double* x) const {
                 for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) y[to] += *from++;
         }
         if (std::any_of(y, y + box.inner, [](double value) { return value != 0.0; })) forward_columns(box.factor, y);
+        if (box.inner > 0) std::copy_n(y, box.inner, x + first_[box.nodes[0]]);
     });
+    take_off_wide(right);
     downward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
         double* y = &fronts[at[b]];
+        std::copy_n(x + first_[box.nodes[0]], box.inner, y);
         double* border = y + box.inner;
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
             border = std::copy_n(x + first_[box.nodes[k]], count_[box.nodes[k]], border);
@@ -378,6 +383,7 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
         left[b].noalias() -= box.factor.bottomRows(box.border) * own;
     });
+    take_off_wide(x);
     downward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
@@ -393,13 +399,12 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {
     if (right.cols() > few_columns) return solve_columns(right);
-    for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c).data());
+    for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c));
 }
 
-// With A = L L^T these are the products of columns of L^-1.
-Eigen::MatrixXd GridFactor::yield(const std::vector<int>& equations) const {
+bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness) {
     const auto columns = static_cast<Eigen::Index>(equations.size());
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(columns, columns);
+    Eigen::MatrixXd yield = Eigen::MatrixXd::Zero(columns, columns);  // Z^T Z
     std::vector<Eigen::MatrixXd> left(boxes_.size());  // [border x columns] what each leaves for the box that it is a half of; empty: nothing
     for (std::size_t b = 0; b < boxes_.size(); ++b) {
         const Box& box = boxes_[b];
@@ -419,10 +424,26 @@ Eigen::MatrixXd GridFactor::yield(const std::vector<int>& equations) const {
         }
         auto own = front.topRows(box.inner);
         box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
-        sum.noalias() += own.transpose() * own;
+        yield.noalias() += own.transpose() * own;
         left[b] = front.bottomRows(box.border) - box.factor.bottomRows(box.border) * own;
+        wide_.push_back({first, own});
     }
-    return sum;
+    const Eigen::LLT<Eigen::MatrixXd> root(yield);
+    if (root.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd across = stiffness * Eigen::MatrixXd(root.matrixL());  // R C
+    const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(columns, columns) + root.matrixL().transpose() * across);
+    if (inner.info() != Eigen::Success) return false;
+    wide_change_ = stiffness - across * inner.solve(across.transpose());
+    return true;
+}
+
+// From L^-1 times right sides.
+void GridFactor::take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const {
+    if (wide_.empty()) return;
+    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), forward.cols());
+    for (const WidePart& part : wide_) seen.noalias() += part.columns.transpose() * forward.middleRows(part.first, part.columns.rows());
+    const Eigen::MatrixXd change = wide_change_ * seen;
+    for (const WidePart& part : wide_) forward.middleRows(part.first, part.columns.rows()).noalias() -= part.columns * change;
 }
 
 double GridFactor::reciprocal_condition() const {

@@ -43,9 +43,9 @@ class GridFactor {
     /// Solves for right sides [equations x any number], in place.
     void solve(Eigen::MatrixXd& right) const;
 
-    /// How the unknowns of these equations, in order, yield to unit forces on one another: the rows and columns of the inverse that
-    /// belong to them. Costs the boxes about them only.
-    Eigen::MatrixXd yield(const std::vector<int>& equations) const;
+    /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is not
+    /// positive definite.
+    bool add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness);
 
     /// A cheap estimate of 1 / condition number: (least / largest diagonal entry of the factor) squared.
     double reciprocal_condition() const;
@@ -79,6 +79,7 @@ class GridFactor {
     bool factor_within(int box, int forks, const Assemble& assemble);
     bool factor_box(Box& box, const Assemble& assemble, Scratch& scratch);
     void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
+    void take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const;
     static double* column_of(Box& box, int c);
     void take_in(Box& box, int half) const;
     static bool eliminate(Box& box);
@@ -88,7 +89,7 @@ class GridFactor {
     void downward(int top, int forks, const Visit& visit) const;
     static void forward_columns(const Eigen::MatrixXd& factor, double* y);
     static void backward_columns(const Eigen::MatrixXd& factor, double* y);
-    void solve_one(double* right) const;
+    void solve_one(Eigen::Ref<Eigen::MatrixXd> right) const;
     void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;
@@ -98,6 +99,15 @@ class GridFactor {
     std::vector<int> box_of_cell_;   // its leaf
     std::vector<int> first_, count_; // [nodes] equations
     int forks_ = 0;                  // levels of the tree at which its halves go side by side
+
+    // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T) L^-1, where
+    // Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
+    struct WidePart {
+        int first;                   // equation
+        Eigen::MatrixXd columns;     // rows of Z from there on; the others are nil
+    };
+    std::vector<WidePart> wide_;     // of the boxes that hold the equations
+    Eigen::MatrixXd wide_change_;    // W
 };
 
 } // namespace crampfit
