@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace crampfit {
 namespace {
@@ -52,15 +53,36 @@ bool touches_edge(const int* box, cv::Size size) {
            box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] == size.height;
 }
 
+/// 255 where the number of a patch is chosen.
+cv::Mat chosen_patches(const cv::Mat& patches, const std::vector<std::uint8_t>& chosen) {
+    cv::Mat picked(patches.size(), CV_8U);
+    for (int v = 0; v < patches.rows; ++v)
+        for (int u = 0; u < patches.cols; ++u)
+            picked.at<std::uint8_t>(v, u) = chosen[patches.at<int>(v, u)] ? 255 : 0;
+    return picked;
+}
+
 /// The patches that `wanted(figures)` picks.
 template <class Wanted> cv::Mat pick(const cv::Mat& mask, const Wanted& wanted) {
     std::vector<std::uint8_t> chosen{0};
-    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { chosen.push_back(wanted(box) ? 255 : 0); });
-    cv::Mat picked(mask.size(), CV_8U);
+    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { chosen.push_back(wanted(box)); });
+    return chosen_patches(patches, chosen);
+}
+
+/// The patches that `wanted(length, area)` picks, length being how far they reach across the rings.
+template <class Wanted> cv::Mat pick_by_length(const cv::Mat& mask, const cv::Mat& coordinate, const Wanted& wanted) {
+    std::vector<int> area{0};
+    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { area.push_back(box[cv::CC_STAT_AREA]); });
+    std::vector<cv::Vec2f> ends(area.size(), {std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest()});
     for (int v = 0; v < mask.rows; ++v)
-        for (int u = 0; u < mask.cols; ++u)
-            picked.at<std::uint8_t>(v, u) = chosen[patches.at<int>(v, u)];
-    return picked;
+        for (int u = 0; u < mask.cols; ++u) {
+            cv::Vec2f& end = ends[patches.at<int>(v, u)];
+            end = {std::min(end[0], coordinate.at<float>(v, u)), std::max(end[1], coordinate.at<float>(v, u))};
+        }
+    std::vector<std::uint8_t> chosen{0};
+    for (std::size_t i = 1; i < area.size(); ++i)
+        chosen.push_back(wanted(1.0 + ends[i][1] - ends[i][0], area[i]));
+    return chosen_patches(patches, chosen);
 }
 
 /// At twenty pixels a ring, which is fine enough for an outline and makes the cost one of the picture's size alone.
@@ -124,7 +146,7 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
 }
 
 cv::Mat find_foreign(const WoodView& view) {
-    const auto& [gray, bgr, around, levels, width] = view;
+    const auto& [gray, bgr, around, coordinate, levels, width] = view;
     const double contrast = levels.contrast(), dark = levels.latewood - too_dark * contrast;
     const cv::Mat hue = strange_hue(bgr, gray.size());
     cv::Mat smooth;
@@ -135,8 +157,8 @@ cv::Mat find_foreign(const WoodView& view) {
     cv::Mat inked;
     cv::dilate(hue | background, inked, disk(3));
     const auto lines = [&](const cv::Mat& mask, double least) {
-        return pick(mask & (inked == 0), [&](const int* box) {
-            const double length = box[cv::CC_STAT_HEIGHT], thickness = box[cv::CC_STAT_AREA] / length;
+        return pick_by_length(mask & (inked == 0), coordinate, [&](double length, double area) {
+            const double thickness = area / length;
             return length > std::max(8.0, least * width) && thickness < 0.25 * length && thickness < 0.2 * width;
         });
     };

@@ -12,6 +12,7 @@ struct WoodView {
     const cv::Mat& gray;    // float, 0..1
     const cv::Mat& bgr;     // blue, green, red, float, 0..1; empty: the picture is gray
     const cv::Mat& around;  // gray of the same ring on both sides, float
+    const cv::Mat& coordinate;  // the ring coordinate, float [pixels]
     WoodLevels levels;
     double ring_width;      // [pixels]
 };

@@ -8,13 +8,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace crampfit {
 namespace {
 
-constexpr double dark_share = 0.03;    // of a ring, that is no brighter than pure LW
-constexpr double bright_share = 0.90;  // of a ring, that is no brighter than pure EW
+constexpr int least_pixels = 20;  // of a stretch of ring that tells its levels
 constexpr double mixed = 1.5;          // pixels on either side of a border that show some of the other side
 
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
@@ -34,6 +34,45 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
+/// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
+class RingProfile {
+  public:
+    explicit RingProfile(double width) : sum_(static_cast<std::size_t>(std::max(1l, std::lround(width))), 0.0), count_(sum_.size(), 0) {}
+
+    /// `place` is 0 at the inner border, 1 at the outer.
+    void add(double place, float gray) {
+        const auto i = std::min(sum_.size() - 1, static_cast<std::size_t>(place * static_cast<double>(sum_.size())));
+        sum_[i] += gray;
+        ++count_[i];
+        ++total_;
+    }
+    int total() const { return total_; }
+
+    /// The brightest and the darkest of its means over a few steps.
+    WoodLevels extremes() const {
+        const std::size_t n = sum_.size(), reach = n / 40;
+        WoodLevels levels{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
+        for (std::size_t i = 0; i < n; ++i) {
+            double sum = 0;
+            int count = 0;
+            for (std::size_t k = i - std::min(i, reach); k <= std::min(n - 1, i + reach); ++k) {
+                sum += sum_[k];
+                count += count_[k];
+            }
+            if (count_[i] == 0)
+                continue;
+            levels.earlywood = std::max(levels.earlywood, sum / count);
+            levels.latewood = std::min(levels.latewood, sum / count);
+        }
+        return levels;
+    }
+
+  private:
+    std::vector<double> sum_;
+    std::vector<int> count_;
+    int total_ = 0;
+};
+
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
@@ -42,18 +81,21 @@ class RingLevels {
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
-            std::vector<float> values;
+            std::optional<RingProfile> profile;
             for (int u = begin; u < end; u += step) {
                 if (!inner.covers(u) || !outer.covers(u))
                     continue;
+                const double width = outer.at(u) - inner.at(u);
+                if (!profile)
+                    profile.emplace(width);
                 for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
                     if (valid.at<float>(v, u) > 0)
-                        values.push_back(gray.at<float>(v, u));
+                        profile->add((v - inner.at(u)) / width, gray.at<float>(v, u));
             }
-            if (values.size() < 20)
+            if (!profile || profile->total() < least_pixels)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            levels_.push_back({quantile(values, bright_share), quantile(values, dark_share)});
+            levels_.push_back(profile->extremes());
         }
     }
 
@@ -172,7 +214,7 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
     std::vector<RingLevels> whole;          // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(10, static_cast<int>(ring_width)));
+        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(40, static_cast<int>(ring_width)));
         if (!ring.empty()) {
             nearest_whole[i] = static_cast<int>(whole.size());
             whole.push_back(std::move(ring));
@@ -198,14 +240,15 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
         for (int v = rows.start; v < rows.end; ++v)
             for (int u = 0; u < valid.cols; ++u) {
                 const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
-                int from = v;
+                float gray = smooth.at<float>(v, u);
                 if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
-                    from = std::max(0, v - 2);
+                    for (int i = std::max(0, v - 2); i < v; ++i)
+                        gray = std::min(gray, smooth.at<float>(i, u));
                 else if (ring > 0 && distance(ring - 1, u, v) < mixed)
-                    from = std::min(valid.rows - 1, v + 2);
+                    for (int i = std::min(valid.rows - 1, v + 2); i > v; --i)
+                        gray = std::max(gray, smooth.at<float>(i, u));
                 const WoodLevels here = nearest_whole[ring] < 0 ? levels : whole[nearest_whole[ring]].at(u);
-                degree.at<float>(v, u) = static_cast<float>((here.earlywood - smooth.at<float>(from, u)) /
-                                                            std::max(here.contrast(), 1e-6));
+                degree.at<float>(v, u) = static_cast<float>((here.earlywood - gray) / std::max(here.contrast(), 1e-6));
             }
     });
     return degree;

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "imaging/border_line.hpp"
+#include "imaging/growth_frame.hpp"
+#include "imaging/orientation.hpp"
+
+#include <vector>
+
+namespace crampfit {
+
+/// Turns directions to the ring borders, whose waves are finer than the window that gradients are gathered over: at a border its own slope counts,
+/// between two of them the turn goes linearly from one to the other, and outside it ceases over a ring.
+void turn_to_borders(OrientationField& field, const std::vector<BorderLine>& borders, const GrowthFrame& frame, double ring_width);
+
+}  // namespace crampfit
