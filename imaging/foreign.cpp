@@ -14,7 +14,7 @@ constexpr double dark_line = 0.5;   // a crack below its ring, of the contrast
 constexpr double light_line = 0.33; // a ray above its ring, of the contrast
 constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than white light
 constexpr double too_green = 0.04; // green above red and blue
-constexpr double blank_black = 0.08, blank_white = 0.92;  // of the brightest in the picture, in each colour
+constexpr double blank_white = 0.92;                      // of the brightest in the picture, in each colour
 constexpr double blank_grain = 0.012;                     // largest standard deviation over a few pixels: wood has more
 constexpr double least_blank = 0.0005;                    // of the picture
 constexpr double most_within = 0.25;  // of blank's area, that is as plain elsewhere: more, and wood itself is
@@ -118,16 +118,16 @@ cv::Mat extreme_colour(const cv::Mat& gray, const cv::Mat& bgr, bool brightest) 
 
 }  // namespace
 
-cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black) {
     cv::Mat mean, squares;
     cv::blur(gray, mean, {5, 5});
     cv::blur(gray.mul(gray), squares, {5, 5});
     const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
-    for (const bool black : {true, false}) {
+    for (const bool dark : {true, false}) {
         cv::Mat colour;
-        cv::blur(extreme_colour(gray, bgr, black), colour, {5, 5});
-        cv::Mat plain = even & (black ? cv::Mat(colour < blank_black) : cv::Mat(colour > blank_white));
+        cv::blur(extreme_colour(gray, bgr, dark), colour, {5, 5});
+        cv::Mat plain = even & (dark ? cv::Mat(colour < black) : cv::Mat(colour > blank_white));
         cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
         const cv::Size size = plain.size();
         const cv::Mat around = pick(plain, [&](const int* box) {
