@@ -54,21 +54,43 @@ std::vector<double> steeper(const BorderLine& border, const std::vector<double>&
     return more;
 }
 
-/// A place of a border in one column.
-struct Crossing {
-    double v, more;
+/// A border, and by how much it is steeper than the directions in each column of the frame.
+struct Steeper {
+    const BorderLine& border;
+    std::vector<double> more;
+
+    struct Foot {
+        double v, more;
+    };
+    /// Where the normal to a ring of this slope, through a place in a column that the border covers, meets it.
+    Foot foot(int u, double v, double slope) const {
+        int column = u;
+        for (int i = 0; i < 3; ++i) {
+            // Newton: v' = b + slope (u' - column) on the border, u' = u - slope (v' - v) on the normal.
+            const double along = (u - slope * (border.at(column) - slope * column - v)) / (1 + slope * slope);
+            const int next = static_cast<int>(std::lround(std::clamp<double>(along, border.first, border.end() - 1)));
+            if (!border.covers(next))
+                break;
+            column = next;
+        }
+        return {border.at(column), more[static_cast<std::size_t>(column)]};
+    }
 };
 
-/// What is to be added to the slope at a place between crossings, which are in order.
-double added_slope(const std::vector<Crossing>& crossings, double v, double ring_width) {
-    const auto outer = std::ranges::upper_bound(crossings, v, {}, &Crossing::v);
-    const auto ceasing = [&](const Crossing& nearest) { return nearest.more * std::max(0.0, 1 - std::abs(v - nearest.v) / ring_width); };
-    if (outer == crossings.end())
-        return crossings.empty() ? 0 : ceasing(crossings.back());
-    if (outer == crossings.begin())
-        return ceasing(*outer);
-    const Crossing& inner = outer[-1];
-    return inner.more + (v - inner.v) / (outer->v - inner.v) * (outer->more - inner.more);
+/// What is to be added to the slope at a place; `covering` are those that cover its column, in order.
+double added_slope(const std::vector<const Steeper*>& covering, int u, double v, double slope, double ring_width) {
+    const auto outer = std::ranges::upper_bound(covering, v, {}, [u](const Steeper* one) { return one->border.at(u); });
+    const auto ceasing = [&](const Steeper& nearest) {
+        const Steeper::Foot foot = nearest.foot(u, v, slope);
+        return foot.more * std::max(0.0, 1 - std::abs(v - foot.v) / ring_width);
+    };
+    if (outer == covering.end())
+        return covering.empty() ? 0 : ceasing(*covering.back());
+    if (outer == covering.begin())
+        return ceasing(**outer);
+    const Steeper::Foot below = outer[-1]->foot(u, v, slope), above = (*outer)->foot(u, v, slope);
+    const double share = above.v > below.v ? std::clamp((v - below.v) / (above.v - below.v), 0.0, 1.0) : 0.5;
+    return below.more + share * (above.more - below.more);
 }
 
 }  // namespace
@@ -77,26 +99,27 @@ void turn_to_borders(OrientationField& field, const std::vector<BorderLine>& bor
     const double sigma = std::clamp(0.08 * ring_width, 4.0, 6.0);
     const cv::Mat cos2 = frame.turn(field.full(field.cos2, frame.picture())), sin2 = frame.turn(field.full(field.sin2, frame.picture()));
     const int columns = frame.size().width;
-    std::vector<std::vector<double>> more;
+    std::vector<Steeper> all;
     for (const BorderLine& border : borders)
-        more.push_back(steeper(border, slopes_along(border, cos2, sin2, frame), columns, sigma));
-    const auto crossings_at = [&](int u) {
-        std::vector<Crossing> crossings;
-        for (std::size_t i = 0; i < borders.size(); ++i)
-            if (borders[i].covers(u))
-                crossings.push_back({borders[i].at(u), more[i][static_cast<std::size_t>(u)]});
-        std::ranges::sort(crossings, {}, &Crossing::v);
-        return crossings;
+        all.push_back({border, steeper(border, slopes_along(border, cos2, sin2, frame), columns, sigma)});
+    const auto covering = [&](int u) {
+        std::vector<const Steeper*> these;
+        for (const Steeper& one : all)
+            if (one.border.covers(u))
+                these.push_back(&one);
+        std::ranges::sort(these, {}, [u](const Steeper* one) { return one->border.at(u); });
+        return these;
     };
     const int lines = frame.across() ? field.cos2.rows : field.cos2.cols, nodes = frame.across() ? field.cos2.cols : field.cos2.rows;
     const auto place = [&](int node) { return field.step * (node + 0.5) - 0.5; };
     for (int line = 0; line < lines; ++line) {
-        const std::vector<Crossing> crossings = crossings_at(std::clamp(static_cast<int>(std::lround(place(line))), 0, columns - 1));
+        const int u = std::clamp(static_cast<int>(std::lround(place(line))), 0, columns - 1);
+        const std::vector<const Steeper*> these = covering(u);
         for (int node = 0; node < nodes; ++node) {
             const cv::Point at = frame.across() ? cv::Point(node, line) : cv::Point(line, node);
             float &c = field.cos2.at<float>(at), &s = field.sin2.at<float>(at);
             const double v = frame.from_picture({place(at.x), place(at.y)}).y;
-            const double slope = slope_of(c, s, frame) + added_slope(crossings, v, ring_width);
+            const double before = slope_of(c, s, frame), slope = before + added_slope(these, u, v, before, ring_width);
             const cv::Point2d n = frame.to_picture({-slope, 1}) - frame.to_picture({0, 0});
             const double square = n.dot(n);
             c = static_cast<float>((n.x * n.x - n.y * n.y) / square);
