@@ -104,11 +104,13 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<RowRange>& photo
     return {rows.begin<float>(), rows.end<float>()};
 }
 
-/// How gray rises down the columns of the finely straightened picture; 0 where that is not known.
-cv::Mat slope_across(const StraightWood& wood) {
+/// How gray rises down the columns of the finely straightened picture; 0 where that is not known. Where the LW of fine rings is but a few pixels
+/// wide, smoothing would move its steepest side away from it.
+cv::Mat slope_across(const StraightWood& wood, double room) {
     const StraightPicture fine = wood.blurred_along(2.0);
+    const double sigma = std::clamp(0.04 * room, 0.3, 1.0);
     cv::Mat smooth, slope, unknown;
-    cv::GaussianBlur(fine.gray, smooth, {1, 0}, 1.0, 1.0);
+    cv::GaussianBlur(fine.gray, smooth, {1, 0}, sigma, sigma);
     cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
     cv::dilate(fine.known < least_known, unknown, cv::Mat::ones(5, 1, CV_8U));
     slope.setTo(0, unknown);
@@ -142,7 +144,10 @@ BorderLine in_frame(const std::vector<double>& row, const std::vector<RowRange>&
 
 std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
                                     const std::vector<BorderGuess>& guesses) {
-    const cv::Mat slope = slope_across(wood);
+    std::vector<float> rooms;
+    for (const BorderGuess& guess : guesses)
+        rooms.push_back(static_cast<float>(guess.room));
+    const cv::Mat slope = slope_across(wood, quantile(rooms, 0.5));
     std::vector<RowRange> photographed;
     for (int u = 0; u < valid.cols; ++u)
         photographed.push_back(photographed_rows(rings, blank, u));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace crampfit {
 namespace {
@@ -13,7 +14,7 @@ constexpr double dark_line = 0.5;   // a crack below its ring, of the contrast
 constexpr double light_line = 0.33; // a ray above its ring, of the contrast
 constexpr double too_blue = 0.08;  // blue above red: wood is never bluer than white light
 constexpr double too_green = 0.04; // green above red and blue
-constexpr double blank_black = 0.08, blank_white = 0.92;  // of the brightest in the picture, in each colour
+constexpr double blank_white = 0.92;                      // of the brightest in the picture, in each colour
 constexpr double blank_grain = 0.012;                     // largest standard deviation over a few pixels: wood has more
 constexpr double least_blank = 0.0005;                    // of the picture
 constexpr double most_within = 0.25;  // of blank's area, that is as plain elsewhere: more, and wood itself is
@@ -52,15 +53,36 @@ bool touches_edge(const int* box, cv::Size size) {
            box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] == size.height;
 }
 
+/// 255 where the number of a patch is chosen.
+cv::Mat chosen_patches(const cv::Mat& patches, const std::vector<std::uint8_t>& chosen) {
+    cv::Mat picked(patches.size(), CV_8U);
+    for (int v = 0; v < patches.rows; ++v)
+        for (int u = 0; u < patches.cols; ++u)
+            picked.at<std::uint8_t>(v, u) = chosen[patches.at<int>(v, u)] ? 255 : 0;
+    return picked;
+}
+
 /// The patches that `wanted(figures)` picks.
 template <class Wanted> cv::Mat pick(const cv::Mat& mask, const Wanted& wanted) {
     std::vector<std::uint8_t> chosen{0};
-    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { chosen.push_back(wanted(box) ? 255 : 0); });
-    cv::Mat picked(mask.size(), CV_8U);
+    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { chosen.push_back(wanted(box)); });
+    return chosen_patches(patches, chosen);
+}
+
+/// The patches that `wanted(length, area)` picks, length being how far they reach across the rings.
+template <class Wanted> cv::Mat pick_by_length(const cv::Mat& mask, const cv::Mat& coordinate, const Wanted& wanted) {
+    std::vector<int> area{0};
+    const cv::Mat patches = for_patches(mask, [&](int, const int* box) { area.push_back(box[cv::CC_STAT_AREA]); });
+    std::vector<cv::Vec2f> ends(area.size(), {std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest()});
     for (int v = 0; v < mask.rows; ++v)
-        for (int u = 0; u < mask.cols; ++u)
-            picked.at<std::uint8_t>(v, u) = chosen[patches.at<int>(v, u)];
-    return picked;
+        for (int u = 0; u < mask.cols; ++u) {
+            cv::Vec2f& end = ends[patches.at<int>(v, u)];
+            end = {std::min(end[0], coordinate.at<float>(v, u)), std::max(end[1], coordinate.at<float>(v, u))};
+        }
+    std::vector<std::uint8_t> chosen{0};
+    for (std::size_t i = 1; i < area.size(); ++i)
+        chosen.push_back(wanted(1.0 + ends[i][1] - ends[i][0], area[i]));
+    return chosen_patches(patches, chosen);
 }
 
 /// At twenty pixels a ring, which is fine enough for an outline and makes the cost one of the picture's size alone.
@@ -96,16 +118,16 @@ cv::Mat extreme_colour(const cv::Mat& gray, const cv::Mat& bgr, bool brightest) 
 
 }  // namespace
 
-cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black) {
     cv::Mat mean, squares;
     cv::blur(gray, mean, {5, 5});
     cv::blur(gray.mul(gray), squares, {5, 5});
     const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
-    for (const bool black : {true, false}) {
+    for (const bool dark : {true, false}) {
         cv::Mat colour;
-        cv::blur(extreme_colour(gray, bgr, black), colour, {5, 5});
-        cv::Mat plain = even & (black ? cv::Mat(colour < blank_black) : cv::Mat(colour > blank_white));
+        cv::blur(extreme_colour(gray, bgr, dark), colour, {5, 5});
+        cv::Mat plain = even & (dark ? cv::Mat(colour < black) : cv::Mat(colour > blank_white));
         cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
         const cv::Size size = plain.size();
         const cv::Mat around = pick(plain, [&](const int* box) {
@@ -124,7 +146,7 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr) {
 }
 
 cv::Mat find_foreign(const WoodView& view) {
-    const auto& [gray, bgr, around, levels, width] = view;
+    const auto& [gray, bgr, around, coordinate, levels, width] = view;
     const double contrast = levels.contrast(), dark = levels.latewood - too_dark * contrast;
     const cv::Mat hue = strange_hue(bgr, gray.size());
     cv::Mat smooth;
@@ -135,8 +157,8 @@ cv::Mat find_foreign(const WoodView& view) {
     cv::Mat inked;
     cv::dilate(hue | background, inked, disk(3));
     const auto lines = [&](const cv::Mat& mask, double least) {
-        return pick(mask & (inked == 0), [&](const int* box) {
-            const double length = box[cv::CC_STAT_HEIGHT], thickness = box[cv::CC_STAT_AREA] / length;
+        return pick_by_length(mask & (inked == 0), coordinate, [&](double length, double area) {
+            const double thickness = area / length;
             return length > std::max(8.0, least * width) && thickness < 0.25 * length && thickness < 0.2 * width;
         });
     };

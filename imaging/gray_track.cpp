@@ -23,6 +23,7 @@ constexpr double most_left = 0.7;       // of the reference's contrast, in pictu
 constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
 constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
 constexpr double slack = 3;             // of the line's middle [px]
+constexpr double ground = 0.3;          // of the picture's brightest, up to which an even ground about the specimen is dark
 constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
 
 cv::Mat pixels_of(const FinePicture& picture) {
@@ -161,7 +162,7 @@ GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::ui
     double brightest = 0;
     cv::minMaxLoc(state->reference, nullptr, &brightest);
     // Bright wood without any pattern is as even as a bright ground.
-    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
+    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}, ground) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
     state->allowed = state->specimen.clone();
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;

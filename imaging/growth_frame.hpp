@@ -14,6 +14,7 @@ class GrowthFrame {
 
     bool across() const { return growth_ == GrowthAxis::right || growth_ == GrowthAxis::left; }
     cv::Size size() const { return across() ? cv::Size(picture_.height, picture_.width) : picture_; }
+    cv::Size picture() const { return picture_; }
 
     /// The pixels in the frame, and in the picture again. Always a copy or the very pixels, never changed in place.
     cv::Mat turn(const cv::Mat& picture) const { return flip(transpose(picture)); }

@@ -173,6 +173,13 @@ cv::Mat RingCoordinate::straighten(const cv::Mat& in_frame) const {
     return straight;
 }
 
+cv::Mat RingCoordinate::map() const {
+    cv::Mat rows(straight_rows(), frame_.width, CV_32F);
+    for (int row = 0; row < rows.rows; ++row)
+        rows.row(row) = static_cast<float>(row);
+    return bend(rows);
+}
+
 cv::Mat RingCoordinate::bend(const cv::Mat& straight) const {
     CV_Assert(straight.type() == CV_32F && straight.cols == frame_.width);
     cv::Mat in_frame(frame_, CV_32F);

@@ -26,6 +26,8 @@ class RingCoordinate {
 
     /// The other way: a straightened picture in the frame again.
     cv::Mat bend(const cv::Mat& straight) const;
+    /// psi at each pixel of the frame, float, from 0 on.
+    cv::Mat map() const;
     int straight_rows() const { return static_cast<int>(highest_ - lowest_) + 1; }
 
   private:

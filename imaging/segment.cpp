@@ -1,6 +1,7 @@
 #include "imaging/segment.hpp"
 
 #include "datasets/error.hpp"
+#include "imaging/border_directions.hpp"
 #include "imaging/flatten.hpp"
 #include "imaging/foreign.hpp"
 #include "imaging/gray_picture.hpp"
@@ -78,8 +79,8 @@ OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
         return {2, {window, window}};
     }
     const double least = std::max(4.0, shorter_side(frame.size()) / 100);
-    const double across = std::max(least, 0.5 * ring_width), along = std::max(least, 0.15 * ring_width);
-    return {std::clamp(0.05 * ring_width, 1.0, 4.0), frame.across() ? cv::Size2d(across, along) : cv::Size2d(along, across)};
+    const double across = std::max(least, 0.5 * ring_width), along = std::max(least, std::min(0.1 * ring_width, 7.0));
+    return {std::clamp(0.03 * ring_width, 1.0, 4.0), frame.across() ? cv::Size2d(across, along) : cv::Size2d(along, across)};
 }
 
 /// Why no rings can be traced; empty where they can.
@@ -123,7 +124,7 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
     } else {
         const cv::Mat around = rings.bend(wood.blurred_along(std::max(8.0, 0.5 * width)).gray);
-        round.features = find_foreign({gray, bgr, around, levels, width});
+        round.features = find_foreign({gray, bgr, around, rings.map(), levels, width});
     }
     round.features.setTo(static_cast<double>(Feature::background), blank);
     return round;
@@ -329,7 +330,9 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     } else {
         classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
     }
-    if (!options.direction.empty())
+    if (options.direction.empty())
+        turn_to_borders(second.orientation, second.borders, frame, width);
+    else
         second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
     fill_maps(specimen, second, classes, frame);
     if (options.density)

@@ -8,13 +8,15 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace crampfit {
 namespace {
 
-constexpr double dark_share = 0.03;    // of a ring, that is no brighter than pure LW
-constexpr double bright_share = 0.90;  // of a ring, that is no brighter than pure EW
+constexpr std::size_t least_pixels = 20;  // of a stretch of ring that tells its levels
+constexpr double dark_share = 0.03;   // of a ring, that is no brighter than its dark wood
+constexpr double bright_share = 0.90; // of a ring, that is no brighter than its bright wood
 constexpr double mixed = 1.5;          // pixels on either side of a border that show some of the other side
 
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
@@ -34,6 +36,59 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
+/// The line through some points by least squares, at a place.
+double line_at(double place, const std::vector<cv::Point2d>& points) {
+    cv::Point2d mean;
+    for (const cv::Point2d& point : points)
+        mean += point / static_cast<double>(points.size());
+    double xx = 0, xy = 0;
+    for (const cv::Point2d& point : points) {
+        xx += (point.x - mean.x) * (point.x - mean.x);
+        xy += (point.x - mean.x) * (point.y - mean.y);
+    }
+    return mean.y + xy / xx * (place - mean.x);
+}
+
+/// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
+class RingProfile {
+  public:
+    explicit RingProfile(double width) : sum_(static_cast<std::size_t>(std::max(1l, std::lround(width))), 0.0), count_(sum_.size(), 0) {}
+
+    /// `place` is 0 at the inner border, 1 at the outer.
+    void add(double place, float gray) {
+        const auto i = std::min(sum_.size() - 1, static_cast<std::size_t>(place * static_cast<double>(sum_.size())));
+        sum_[i] += gray;
+        ++count_[i];
+    }
+    /// The brightest and the darkest of its means over a few steps, or of what these tend to at the borders: EW may darken from its very beginning.
+    WoodLevels extremes() const {
+        const std::size_t n = sum_.size(), reach = n / 40;
+        std::vector<cv::Point2d> means;  // over the place in the ring, in steps
+        for (std::size_t i = 0; i < n; ++i) {
+            double sum = 0;
+            int count = 0;
+            for (std::size_t k = i - std::min(i, reach); k <= std::min(n - 1, i + reach); ++k) {
+                sum += sum_[k];
+                count += count_[k];
+            }
+            if (count_[i] > 0)
+                means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
+        }
+        const auto [dark, bright] = std::ranges::minmax(means, {}, &cv::Point2d::y);
+        const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
+        WoodLevels levels{bright.y, dark.y};
+        if (means.size() >= 2 * some) {
+            levels.earlywood = std::max(levels.earlywood, line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)}));
+            levels.latewood = std::min(levels.latewood, line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()}));
+        }
+        return levels;
+    }
+
+  private:
+    std::vector<double> sum_;
+    std::vector<int> count_;
+};
+
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
@@ -42,23 +97,31 @@ class RingLevels {
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
-            std::vector<float> values;
+            std::optional<RingProfile> profile;
+            std::vector<float> grays;
             for (int u = begin; u < end; u += step) {
                 if (!inner.covers(u) || !outer.covers(u))
                     continue;
+                const double width = outer.at(u) - inner.at(u);
+                if (!profile)
+                    profile.emplace(width);
                 for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
-                    if (valid.at<float>(v, u) > 0)
-                        values.push_back(gray.at<float>(v, u));
+                    if (valid.at<float>(v, u) > 0) {
+                        grays.push_back(gray.at<float>(v, u));
+                        profile->add((v - inner.at(u)) / width, grays.back());
+                    }
             }
-            if (values.size() < 20)
+            if (grays.size() < least_pixels)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            levels_.push_back({quantile(values, bright_share), quantile(values, dark_share)});
+            levels_.push_back(profile->extremes());
+            ranges_.push_back({quantile(grays, bright_share), quantile(grays, dark_share)});
         }
     }
 
     bool empty() const { return levels_.empty(); }
-    const std::vector<WoodLevels>& all() const { return levels_; }
+    /// What most of the wood's grays lie between, noise and all.
+    const std::vector<WoodLevels>& ranges() const { return ranges_; }
 
     WoodLevels at(int u) const {
         const auto after = std::lower_bound(columns_.begin(), columns_.end(), u);
@@ -81,13 +144,13 @@ class RingLevels {
 
   private:
     std::vector<double> columns_;
-    std::vector<WoodLevels> levels_;
+    std::vector<WoodLevels> levels_, ranges_;
 };
 
-WoodLevels median_levels(const std::vector<RingLevels>& rings) {
+WoodLevels usual_range(const std::vector<RingLevels>& rings) {
     std::vector<float> early, late;
     for (const RingLevels& ring : rings)
-        for (const WoodLevels& level : ring.all()) {
+        for (const WoodLevels& level : ring.ranges()) {
             early.push_back(static_cast<float>(level.earlywood));
             late.push_back(static_cast<float>(level.latewood));
         }
@@ -167,20 +230,20 @@ cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
 }
 
 cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
-                       const std::vector<BorderLine>& borders, double ring_width, WoodLevels& levels) {
+                       const std::vector<BorderLine>& borders, double ring_width, WoodLevels& range) {
     const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
     std::vector<RingLevels> whole;          // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(10, static_cast<int>(ring_width)));
+        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(40, static_cast<int>(ring_width)));
         if (!ring.empty()) {
             nearest_whole[i] = static_cast<int>(whole.size());
             whole.push_back(std::move(ring));
         }
     }
-    levels = whole.empty() ? otsu_levels(smooth, valid) : median_levels(whole);
+    range = whole.empty() ? otsu_levels(smooth, valid) : usual_range(whole);
     for (RingLevels& ring : whole)
-        ring.mend(levels);
+        ring.mend(range);
     for (std::size_t i = 1; i < nearest_whole.size(); ++i)
         if (nearest_whole[i] < 0)
             nearest_whole[i] = nearest_whole[i - 1];
@@ -198,14 +261,15 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
         for (int v = rows.start; v < rows.end; ++v)
             for (int u = 0; u < valid.cols; ++u) {
                 const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
-                int from = v;
+                float gray = smooth.at<float>(v, u);
                 if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
-                    from = std::max(0, v - 2);
+                    for (int i = std::max(0, v - 2); i < v; ++i)
+                        gray = std::min(gray, smooth.at<float>(i, u));
                 else if (ring > 0 && distance(ring - 1, u, v) < mixed)
-                    from = std::min(valid.rows - 1, v + 2);
-                const WoodLevels here = nearest_whole[ring] < 0 ? levels : whole[nearest_whole[ring]].at(u);
-                degree.at<float>(v, u) = static_cast<float>((here.earlywood - smooth.at<float>(from, u)) /
-                                                            std::max(here.contrast(), 1e-6));
+                    for (int i = std::min(valid.rows - 1, v + 2); i > v; --i)
+                        gray = std::max(gray, smooth.at<float>(i, u));
+                const WoodLevels here = nearest_whole[ring] < 0 ? range : whole[nearest_whole[ring]].at(u);
+                degree.at<float>(v, u) = static_cast<float>((here.earlywood - gray) / std::max(here.contrast(), 1e-6));
             }
     });
     return degree;
