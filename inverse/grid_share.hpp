@@ -9,7 +9,10 @@
 
 namespace crampfit {
 
-/// The study with these values [parameters], SI, on cells twice as wide, each scene on that grid alone. `stop` may be null.
+/// The study on cells twice as wide, each scene on that grid alone.
+Study on_wide_cells(Study study);
+
+/// Its run with these values [parameters], SI. `stop` may be null.
 Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop);
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
@@ -25,8 +28,9 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
 /// `about` tells of the best point, seen in `window`.
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window);
 
-/// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it as spread
-/// evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value. The message says it.
+/// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
+/// as spread evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value or, on a
+/// linear scale, of half its box if that is more. The message says it.
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left);
 
 }  // namespace crampfit
