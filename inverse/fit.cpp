@@ -133,65 +133,6 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
                        : "No run ended well; the first: " + objective.runs().front().evaluation->status;
 }
 
-// Where the time went.
-std::string cost_text(const Fit& fit, double search_seconds) {
-    double of_runs = 0;
-    for (const auto& run : fit.runs) {
-        of_runs += run.seconds;
-    }
-    return fmt::format(" Search {:.3g} s, all else {:.3g} s; {} runs took {:.3g} s of it, each by itself.", search_seconds,
-                       fit.seconds - search_seconds, fit.runs.size(), of_runs);
-}
-
-/// Descents on walks, for a study or one that stands in for it.
-class Walker {
-  public:
-    Walker(const Study& study, const KeptWalks& walks, StudyModel& model, int threads, const std::atomic<bool>* stop)
-        : study_(study), walks_(walks), model_(model), threads_(threads), stop_(stop) {
-        const std::vector<int> lengths = model.curve_lengths();
-        rows_ = std::accumulate(lengths.begin(), lengths.end(), 0);
-    }
-
-    Nearby nearby() const {
-        return {near_by(&KeptWalks::near), near_by(&KeptWalks::rough), walks_.exact_near(), walks_.turn_with_toughness()};
-    }
-
-    // Below this misfit the first descent, weighed by what the model knows at worst, leaves the rest to descents that are weighed better.
-    double enough() const { return walks_.turn_with_toughness() ? 0.0 : rows_; }
-
-  private:
-    Near near_by(Forward (KeptWalks::*runs)(const std::vector<double>&) const) const {
-        return [this, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
-            const Eigen::VectorXd values = model_.box().values(point);
-            auto close = std::make_shared<StudyModel>(study_, (walks_.*runs)({values.begin(), values.end()}), model_.resolution(), stop_);
-            const int together = walks_.depend_on_order() ? threads_ : 0;
-            return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, together > 0 ? together : share); };
-        };
-    }
-
-    const Study& study_;
-    const KeptWalks& walks_;
-    StudyModel& model_;
-    int threads_, rows_ = 0;
-    const std::atomic<bool>* stop_;
-};
-
-/// Where a search on cells twice as wide ends, from which the search on the study's own goes on. For walks whose runs go on from one
-/// another: none of these is kept for `--resume` anyway.
-Eigen::VectorXd start_on_wide_cells(const Study& study, const FitOptions& options, int threads, int walk_threads, std::string& told) {
-    const Study wide = on_wide_cells(study);
-    const KeptWalks walks(wide, walk_threads);
-    StudyModel model(wide, walks.exact(), solver_resolution, options.stop_requested);
-    Objective objective(
-        model.box().size(), [&](const Eigen::VectorXd& x, int) { return model.evaluate(x, threads); }, study.optimizer.max_runs, 1,
-        options.stop_requested);
-    const Walker walker(wide, walks, model, threads, options.stop_requested);
-    descend_by_walks(objective, walker.nearby(), study.optimizer.starts, walker.enough(), model.box().initial(), options.seed,
-                     [](const std::string&) {});
-    told = fmt::format(" It began where {} runs on cells twice as wide led.", objective.runs().size());
-    return objective.best() ? objective.best()->x : model.box().initial();
-}
-
 const char* explain(FitStatus status) {
     switch (status) {
     case FitStatus::converged:
@@ -219,8 +160,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const auto begin = Clock::now();
     const bool own = !options.forward;
     const int threads = thread_count(options.threads);
-    const int walk_threads = std::max(1, threads / std::max(1, static_cast<int>(study.experiments.size())));
-    const KeptWalks walks(study, walk_threads);
+    const KeptWalks walks(study, std::max(1, threads / std::max(1, static_cast<int>(study.experiments.size()))));
     const bool only_toughness = own && walks.only_toughness();
     const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
     // The same bits for any number of threads: runs that go on from one another are made one after the other.
@@ -228,8 +168,14 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const bool in_order = on_walks && walks.depend_on_order();
     const Forward forward = !own ? options.forward : on_walks ? walks.exact() : walks.in_any_order();
     StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
-    const Walker walker(study, walks, model, threads, options.stop_requested);
-    const Nearby nearby = walker.nearby();
+    const auto by_walk_of = [&](Forward (KeptWalks::*runs)(const std::vector<double>&) const) -> Near {
+        return [&, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
+            const Eigen::VectorXd values = model.box().values(point);
+            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), model.resolution(), options.stop_requested);
+            return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
+        };
+    };
+    const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(), walks.turn_with_toughness()};
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
@@ -252,16 +198,11 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
-    const double enough = walker.enough();
-    Eigen::VectorXd start = box.initial();
-    std::string told;
-    if (by_walks && in_order && !only_toughness && !nearby.ways_differ && walks.have_wide_grids()) {
-        stage("cells twice as wide");
-        start = start_on_wide_cells(study, options, threads, walk_threads, told);
-    }
-    SearchResult found = by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, start, options.seed, stage)
-                                  : search(objective, study.optimizer, start, options.seed, stage);
-    found.method += told;
+    // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
+    const std::vector<int> lengths = model.curve_lengths();
+    const double enough = nearby.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
+    SearchResult found = by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, box.initial(), options.seed, stage)
+                                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
     for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
         // How well the model knows what it says shows where it fits.
         const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
@@ -278,7 +219,6 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         found.converged = descend_again(objective, nearby, options.seed);
     }
     objective.set_budget_left(objective.budget_left() + reserve);
-    const double search_seconds = seconds_since(begin);
 
     Fit fit;
     fit.method = found.method;
@@ -355,7 +295,6 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);
-    fit.method += cost_text(fit, search_seconds);
     return fit;
 }
 

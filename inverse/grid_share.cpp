@@ -49,16 +49,12 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorX
 
 }  // namespace
 
-Study on_wide_cells(Study study) {
-    for (Experiment& experiment : study.experiments) {
+Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    Study wide = study;
+    for (Experiment& experiment : wide.experiments) {
         experiment.scene.model.cell *= 2.0;
         experiment.scene.solver.extrapolate = false;
     }
-    return study;
-}
-
-Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
-    const Study wide = on_wide_cells(study);
     const Forward simulation = [](const Scene& scene, const std::atomic<bool>* end) {
         SimulateOptions options;
         options.stop_requested = end;

@@ -9,10 +9,7 @@
 
 namespace crampfit {
 
-/// The study on cells twice as wide, each scene on that grid alone.
-Study on_wide_cells(Study study);
-
-/// Its run with these values [parameters], SI. `stop` may be null.
+/// The study with these values [parameters], SI, on cells twice as wide, each scene on that grid alone. `stop` may be null.
 Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop);
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.

@@ -89,10 +89,6 @@ class KeptWalks::Store {
         return exact;
     }
 
-    bool have_wide_grids() const {
-        return std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).extrapolates(); });
-    }
-
     bool has_slopes() const {
         const bool of_wood = std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
         return of_wood && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
@@ -136,8 +132,8 @@ class KeptWalks::Store {
         return record;
     }
 
-    // The stiffness in which all stress of a scene may be measured, where the fit changes every stiffness that it has: then a walk
-    // serves all scenes that differ from its own by this unit.
+    // The stiffness in which all stress of a scene may be measured, where the fit changes every stiffness that it has: then a
+    // walk serves all scenes that differ from its own by this unit.
     const Setting* unit_of(const Scene& scene) const {
         const Setting* unit = nullptr;
         for (const std::string& key : stress_keys(scene)) {
@@ -257,7 +253,6 @@ Forward KeptWalks::rough(const std::vector<double>& values) const {
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
 bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness(); }
-bool KeptWalks::have_wide_grids() const { return store_->have_wide_grids(); }
 std::vector<bool> KeptWalks::exact_near() const { return store_->exact_near(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
 bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }

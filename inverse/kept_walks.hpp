@@ -41,9 +41,6 @@ class KeptWalks {
     /// In which parameters runs near a point are exact [parameters].
     std::vector<bool> exact_near() const;
 
-    /// Whether a second grid, with cells twice as wide, goes along with every scene's.
-    bool have_wide_grids() const;
-
     /// Whether walks have derivatives by all other parameters.
     bool has_slopes() const;
 

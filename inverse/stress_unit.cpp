@@ -41,9 +41,9 @@ void multiply_stress(Scene& scene, double factor) {
         material.toughness *= factor;
         material.youngs_modulus *= factor;
         if (material.orthotropic) {
-            for (double OrthotropicElasticity::*modulus :
-                 {&OrthotropicElasticity::E_R, &OrthotropicElasticity::E_T, &OrthotropicElasticity::G_RT, &OrthotropicElasticity::E_L}) {
-                *material.orthotropic.*modulus *= factor;
+            OrthotropicElasticity& moduli = *material.orthotropic;
+            for (double* modulus : {&moduli.E_R, &moduli.E_T, &moduli.G_RT, &moduli.E_L}) {
+                *modulus *= factor;
             }
         }
     }

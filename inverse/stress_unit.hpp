@@ -8,9 +8,9 @@
 
 namespace crampfit {
 
-/// A scene at equilibrium that is loaded by given displacements alone has no stress but that of its materials: with every stiffness
-/// and every toughness so many times as large, displacements stay as they are, cracks grow alike, and forces and energies are so
-/// many times as large. A record of one such scene is one of all, but for the unit of stress.
+/// A scene at equilibrium that is loaded by given displacements alone has no stress but that of its materials: with every
+/// stiffness and every toughness so many times as large, displacements stay as they are, cracks grow alike, and forces and
+/// energies are so many times as large. A record of one such scene is one of all, but for the unit of stress.
 
 /// Keys of a scene's stiffnesses [Pa]; none where other stress or force has a say too.
 std::vector<std::string> stress_keys(const Scene& scene);

@@ -14,8 +14,8 @@
 namespace crampfit {
 namespace {
 
-// Parts of the box. The radius is that of the parameters in which the model of the runs nearby is of first order; in the others it goes
-// farther.
+// Parts of the box. The radius is that of the parameters in which the model of the runs nearby is of first order; in the others
+// it goes farther.
 constexpr double first_radius = 0.2;
 constexpr double reach_where_exact = 5.0;  // radii
 constexpr double last_radius = 0.03;

@@ -19,16 +19,17 @@ struct Nearby {
     bool ways_differ;         // from point to point, which they do not see
 };
 
-/// Least squares where a run leaves behind a cheap model of the runs nearby: each step searches that model within a trust region, runs
-/// the study where the model is lowest, and goes on from there if that is lower (Conn, Gould and Toint 2000, algorithm 6.1.1). The
-/// model is searched from several points, so that a curve with jumps does not easily catch it in a side valley. The search asks
-/// `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where the misfit is below `enough`.
-/// It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as the noise does not explain the
-/// misfit. Where ways differ it starts from the lowest of some more such points anyway.
+/// Least squares where a run leaves behind a cheap model of the runs nearby: each step searches that model within a trust
+/// region, runs the study where the model is lowest, and goes on from there if that is lower (Conn, Gould and Toint 2000,
+/// algorithm 6.1.1). The model is searched from several points, so that a curve with jumps does not easily catch it in a side
+/// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where
+/// the misfit is below `enough`. It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as
+/// the noise does not explain the misfit. Where ways differ it starts from the lowest of some more such points anyway.
 SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough, const Eigen::VectorXd& initial,
                               unsigned seed, const std::function<void(const std::string&)>& stage);
 
-/// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own criterion.
+/// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
+/// criterion.
 bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed);
 
 /// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.

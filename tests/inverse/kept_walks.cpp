@@ -76,7 +76,8 @@ TEST(UnitKeptWalks, AnotherToughnessGoesItsOwnWay) {
     }
 }
 
-// With every stiffness and every toughness 1.7 times as large nothing changes but the unit of stress: no equilibrium is solved for anew.
+// With every stiffness and every toughness 1.7 times as large nothing changes but the unit of stress: no equilibrium is solved
+// for anew.
 TEST(UnitKeptWalks, AnotherUnitOfStressIsOnTheSameWalk) {
     Scene scene = across_inclined_rings(GrowthDirection::normal_to_opening);
     Study study = toughness_study(scene);
@@ -96,8 +97,9 @@ TEST(UnitKeptWalks, AnotherUnitOfStressIsOnTheSameWalk) {
     double most = 0;
     for (std::size_t i = 1; i < alone.series.size(); ++i) {
         const Instant &a = second.series[i], &b = alone.series[i];
-        most = std::max({most, std::abs(a.force / b.force - 1), std::abs(a.external_work / b.external_work - 1), std::abs(a.K_I / b.K_I - 1),
-                         std::abs(a.crack_length / b.crack_length - 1), std::abs(a.displacement - b.displacement)});
+        most = std::max({most, std::abs(a.force / b.force - 1), std::abs(a.external_work / b.external_work - 1),
+                         std::abs(a.K_I / b.K_I - 1), std::abs(a.crack_length / b.crack_length - 1),
+                         std::abs(a.displacement / b.displacement - 1)});
     }
     std::printf("other unit of stress: within %.1e of a run of its own\n", most);
     EXPECT_LT(most, 1e-9);
