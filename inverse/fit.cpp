@@ -23,6 +23,7 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 namespace crampfit {
@@ -174,7 +175,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
         };
     };
-    const Near near = by_walk_of(&KeptWalks::near);
+    const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(), walks.turn_with_toughness()};
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
@@ -197,14 +198,16 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
-    const Near rough = by_walk_of(&KeptWalks::rough);
-    SearchResult found =
-        by_walks ? descend_by_walks(objective, near, rough, study.optimizer.starts, walks.turn_with_toughness(), box.initial(), options.seed, stage)
-                 : search(objective, study.optimizer, box.initial(), options.seed, stage);
+    // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
+    const std::vector<int> lengths = model.curve_lengths();
+    const double enough = nearby.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
+    SearchResult found = by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, box.initial(), options.seed, stage)
+                                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
     for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
         // How well the model knows what it says shows where it fits.
         const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
-        if (std::abs(likely - model.resolution()) <= 0.1 * model.resolution()) {
+        const bool ended_early = round == 0 && enough > 0;
+        if (!ended_early && std::abs(likely - model.resolution()) <= 0.1 * model.resolution()) {
             break;
         }
         model.set_resolution(likely);
@@ -213,7 +216,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             model.weigh(evaluation, box.values(run.x));
             return evaluation;
         });
-        found.converged = descend_again(objective, near, rough, walks.turn_with_toughness(), options.seed);
+        found.converged = descend_again(objective, nearby, options.seed);
     }
     objective.set_budget_left(objective.budget_left() + reserve);
 
@@ -240,7 +243,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             const Eigen::VectorXd x = objective.best()->x;
             wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, run_on_wide_cells, std::cref(study), box.values(x),
                               options.stop_requested);
-            close.emplace(look_close(objective, near(x), x, model.curve_lengths(), names, options.seed));
+            close.emplace(look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed));
             return close->uncertainty;
         };
         const auto look_around = [&](const Uncertainty& about) {

@@ -20,12 +20,24 @@ namespace {
 // Of the largest, all columns being of length one: below that a slope is curvature.
 constexpr double resolved = 1e-3;
 
-// Of a parameter's value: farther off, the wide cells are not near enough to the truth for errors to go with a power of the cell, nor slopes at
-// the best point for the way there.
+// Of a parameter's size: farther off, the wide cells are not near enough to the truth for errors to go with a power of the
+// cell, nor slopes at the best point for the way there.
 constexpr double farthest_told = 0.1;
 
 // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
 double share_of_grids(const Scene& scene) { return KeptWalk(scene).extrapolates() ? 0.75 : 1.0; }
+
+// What a parameter's shifts are large or small beside, SI: its value, and where that may be near 0 half of its box.
+double size_of(const Parameter& parameter, double value) {
+    return parameter.scale == Scale::linear ? std::max(std::abs(value), 0.5 * (parameter.upper - parameter.lower)) : value;
+}
+
+// A shift [SI] of a parameter from a value, as a part of it, or in its unit where the value may be near 0.
+std::string shift_text(const Parameter& parameter, double value, double shift) {
+    return size_of(parameter, value) > std::abs(value)
+               ? fmt::format("'{}' {:+.2g} {}", parameter.name, shift / parameter.unit_factor, parameter.unit)
+               : fmt::format("'{}' {:+.2g} %", parameter.name, 100 * shift / value);
+}
 
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorXd& change) {
     const Eigen::VectorXd scale = slope.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
@@ -74,8 +86,10 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
 }
 
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {
+    const Eigen::VectorXd values = box.values(x);
+    const Eigen::VectorXd shifts = box.values(x + left) - values;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
-        if (std::abs(box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1) > farthest_told) {
+        if (std::abs(shifts[j]) > farthest_told * size_of(box.parameters()[static_cast<std::size_t>(j)], values[j])) {
             fit.message += "What the grid leaves is not told: a fit on cells twice as wide, which would tell it, goes too far off. ";
             return;
         }
@@ -83,12 +97,13 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     Eigen::VectorXd own(box.size());  // in the parameters' units
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
-        FittedParameter& parameter = fit.parameters[static_cast<std::size_t>(j)];
-        const double unit = box.parameters()[static_cast<std::size_t>(j)].unit_factor;
-        double& end = left[j] < 0 ? parameter.lower_95 : parameter.upper_95;
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
+        const double unit = parameter.unit_factor;
+        double& end = left[j] < 0 ? fitted.lower_95 : fitted.upper_95;
         end = box.value(j, box.share(j, end * unit) + left[j]) / unit;
         own[j] = box.slope(j, x[j]) / unit * left[j];
-        told.push_back(fmt::format("'{}' {:+.2g} %", parameter.name, 100 * (box.value(j, x[j] + left[j]) / box.value(j, x[j]) - 1)));
+        told.push_back(shift_text(parameter, values[j], shifts[j]));
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
     fit.covariance += own * own.transpose() / 3.0;  // the mean square of what is spread evenly from 0 to 1
@@ -98,8 +113,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     }
     fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
-    fit.message += fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. Intervals take that in "
-                               "on its side; it makes up to {:.0f} % of a variance. ",
+    fit.message += fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
+                               "Intervals take that in on its side; it makes up to {:.0f} % of a variance. ",
                                fmt::join(told, ", "), 100 * most);
 }
 

@@ -25,8 +25,9 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
 /// `about` tells of the best point, seen in `window`.
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window);
 
-/// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it as spread
-/// evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value. The message says it.
+/// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
+/// as spread evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value or, on a
+/// linear scale, of half its box if that is more. The message says it.
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left);
 
 }  // namespace crampfit

@@ -4,6 +4,7 @@
 #include "datasets/io.hpp"
 #include "datasets/machine.hpp"
 #include "forward/kept_walk.hpp"
+#include "inverse/stress_unit.hpp"
 
 #include <fmt/format.h>
 
@@ -37,7 +38,7 @@ bool has(const Scene& scene, const std::string& key) {
 
 class KeptWalks::Store {
   public:
-    Store(const Study& study, int threads) : threads_(threads) {
+    Store(const Study& study, int threads) : threads_(threads), parameters_(study.parameters.size()) {
         for (const Scene* scene : scenes_of(study)) {
             scenes_.push_back(scene);
         }
@@ -58,7 +59,7 @@ class KeptWalks::Store {
     // On the walk of the scene with other values.
     Record run_near(const std::vector<double>& values, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         Scene base = scene;
-        for (const Setting& setting : of_walk(scene)) {
+        for (const Setting& setting : settings_of_walk(scene)) {
             set_number(base, setting.key, setting.factor * values[setting.parameter]);
         }
         return run(base, scene, rough, stop);
@@ -72,6 +73,20 @@ class KeptWalks::Store {
 
     bool turn_with_toughness() const {
         return std::any_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) { return turns_with_toughness(*scene); });
+    }
+
+    std::vector<bool> exact_near() const {
+        std::vector<bool> exact(parameters_, true);
+        const auto make_walks = [&](const std::vector<Setting>& settings) {
+            for (const Setting& setting : settings) {
+                exact[setting.parameter] = false;
+            }
+        };
+        make_walks(others_);
+        if (turn_with_toughness()) {
+            make_walks(toughness_);
+        }
+        return exact;
     }
 
     bool has_slopes() const {
@@ -102,8 +117,44 @@ class KeptWalks::Store {
     Record run(const Scene& base, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         SimulateOptions options;
         options.stop_requested = stop;
-        const std::shared_ptr<KeptWalk> walk = walk_of(base);
-        return walk->reusable() ? walk->run(scene, options, rough) : simulate(scene, options);
+        const Setting* unit = unit_of(scene);
+        if (!unit) {
+            const std::shared_ptr<KeptWalk> walk = walk_of(base);
+            return walk->reusable() ? walk->run(scene, options, rough) : simulate(scene, options);
+        }
+        const std::shared_ptr<KeptWalk> walk = walk_of(in_unit(base, *unit));
+        if (!walk->reusable()) {
+            return simulate(scene, options);
+        }
+        Record record = walk->run(in_unit(scene, *unit), options, rough);
+        record.scene_text = scene.text;
+        multiply_stress(record, get_number(scene, unit->key) / unit->initial);
+        return record;
+    }
+
+    // The stiffness in which all stress of a scene may be measured, where the fit changes every stiffness that it has: then a
+    // walk serves all scenes that differ from its own by this unit.
+    const Setting* unit_of(const Scene& scene) const {
+        const Setting* unit = nullptr;
+        for (const std::string& key : stress_keys(scene)) {
+            const auto found = std::find_if(others_.begin(), others_.end(), [&](const Setting& s) { return s.key == key; });
+            if (found == others_.end()) {
+                return nullptr;
+            }
+            unit = unit ? unit : &*found;
+        }
+        return unit;
+    }
+
+    // The scene with that stiffness at its initial value, and all other stress in proportion.
+    Scene in_unit(Scene scene, const Setting& unit) const {
+        multiply_stress(scene, unit.initial / get_number(scene, unit.key));
+        for (const Setting& setting : others_) {
+            if (setting.parameter == unit.parameter && has(scene, setting.key)) {
+                set_number(scene, setting.key, setting.initial);  // to the last digit, as it names the walk
+            }
+        }
+        return scene;
     }
 
     // Whether a crack goes another way through wood that is tougher.
@@ -114,7 +165,7 @@ class KeptWalks::Store {
     }
 
     // The scene's numbers that make another walk.
-    std::vector<Setting> of_walk(const Scene& scene) const {
+    std::vector<Setting> settings_of_walk(const Scene& scene) const {
         std::vector<Setting> settings = others_;
         if (turns_with_toughness(scene)) {
             settings.insert(settings.end(), toughness_.begin(), toughness_.end());
@@ -126,7 +177,7 @@ class KeptWalks::Store {
     // What tells walks apart: the scene as it was read, and what the fit has changed in it.
     std::string name_of(const Scene& scene) const {
         std::string name = scene.file.string() + '\n' + scene.text;
-        for (const Setting& setting : of_walk(scene)) {
+        for (const Setting& setting : settings_of_walk(scene)) {
             name += fmt::format("\n{}={}", setting.key, get_number(scene, setting.key));
         }
         return name;
@@ -138,9 +189,11 @@ class KeptWalks::Store {
                 set_number(scene, setting.key, setting.initial);
             }
         }
+        const Setting* unit = unit_of(scene);
         std::vector<std::string> numbers;
         for (const Setting& setting : others_) {
-            if (setting.key.starts_with("materials.") && has(scene, setting.key)) {
+            const bool stays = unit && setting.parameter == unit->parameter;
+            if (!stays && setting.key.starts_with("materials.") && has(scene, setting.key)) {
                 numbers.push_back(setting.key);
             }
         }
@@ -163,6 +216,7 @@ class KeptWalks::Store {
     }
 
     int threads_;
+    std::size_t parameters_;
     std::vector<const Scene*> scenes_;
     std::vector<Setting> toughness_, others_;
     std::mutex mutex_;
@@ -199,6 +253,7 @@ Forward KeptWalks::rough(const std::vector<double>& values) const {
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
 bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness(); }
+std::vector<bool> KeptWalks::exact_near() const { return store_->exact_near(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
 bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }
 

@@ -38,6 +38,9 @@ class KeptWalks {
     /// Whether other toughnesses send a crack another way.
     bool turn_with_toughness() const;
 
+    /// In which parameters runs near a point are exact [parameters].
+    std::vector<bool> exact_near() const;
+
     /// Whether walks have derivatives by all other parameters.
     bool has_slopes() const;
 

@@ -17,7 +17,10 @@ constexpr double noise_floor =
 constexpr double near_stations = 0.25e-3;  // least and largest growth between arrival stations [m]
 constexpr double far_stations = 0.5e-3;
 constexpr double rows_in_a_window = 2;  // of crack length, at least, where it is averaged
-constexpr double line_averages = 1.5;  // rows, in the mean over its places, a line between two: the mean of s^2 + (1 - s)^2 is 1 / 1.5
+// Rows, in the mean over its places, a line between two: the mean of s^2 + (1 - s)^2 is 1 / 1.5.
+constexpr double line_averages = 1.5;
+// In standard deviations of what a curve goes from row to row by noise: a step beyond is a jump, hardly ever noise.
+constexpr double clear = 5.0;
 
 bool measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
@@ -84,20 +87,24 @@ double usual_step(const Curve& rows) {
     return median(std::move(steps));
 }
 
-// How the crack grew from row to row: steadily, so that the line between two rows says when it came up to a length, or by a jump, which
-// was anywhere between them.
+// How the crack grew from row to row: steadily, so that the line between two rows says when it came up to a length, or by a
+// jump, which was anywhere between them.
 class GrowthByRows {
   public:
     GrowthByRows(const Curve& rows, double noise) : rows_(rows) {
-        constexpr double clear = 5.0;
-        std::vector<double> steady{0.0};
+        std::vector<double> grown{0.0};  // from row to row, none beyond the ends
         for (std::size_t i = 0; i + 1 < rows.y().size(); ++i) {
+            grown.push_back(rows.y()[i + 1] - rows.y()[i]);
+        }
+        grown.push_back(0.0);
+        std::vector<double> steady{0.0};
+        for (std::size_t i = 1; i + 1 < grown.size(); ++i) {
             // What is beyond twice the growth of the rows before and after; growth begins and ends between rows as jumps do.
-            const double common = std::max(0.0, std::min(step(i - 1), step(i + 1)));
-            const double jumped = step(i) > clear * noise ? std::max(0.0, 1 - 2 * common / step(i)) : 0.0;
-            jump_error_.push_back(jumped * (rows.x()[i + 1] - rows.x()[i]));
-            if (jumped < 0.5 && step(i) > 0) {
-                steady.push_back(step(i));
+            const double common = std::max(0.0, std::min(grown[i - 1], grown[i + 1]));
+            const double jumped = grown[i] > clear * noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
+            jump_error_.push_back(jumped * (rows.x()[i] - rows.x()[i - 1]));
+            if (jumped < 0.5 && grown[i] > 0) {
+                steady.push_back(grown[i]);
             }
         }
         steady_step_ = median(std::move(steady));
@@ -118,9 +125,6 @@ class GrowthByRows {
     }
 
   private:
-    // From row i to the next; none beyond the ends, where i + 1 may wrap to 0.
-    double step(std::size_t i) const { return i + 1 > 0 && i + 1 < rows_.y().size() ? rows_.y()[i + 1] - rows_.y()[i] : 0.0; }
-
     const Curve& rows_;
     std::vector<double> jump_error_;  // of an arrival between two rows [m] or [s]
     double steady_step_ = 0;
@@ -204,10 +208,10 @@ double Comparison::shift_error(const Curve& force, double at, double sigma) cons
     return span > 0 ? (high - low) / span * sigma : 0.0;
 }
 
-// A fall of the force between two rows, as a jump of the crack makes it, was anywhere between them. What that does to the mean: the fall
-// times the standard deviation of its place, uniform between the rows, over the window. `usual` is what the force goes from row to row.
+// A fall of the force between two rows, as a jump of the crack makes it, was anywhere between them. What that does to the mean:
+// the fall times the standard deviation of its place, uniform between the rows, over the window. `usual` is what the force goes
+// from row to row.
 double Comparison::sampling_error(const Curve& rows, double at, double usual) const {
-    constexpr double clear = 5.0;
     const double from = std::max(from_, at - 0.5 * window_), to = std::min(to_, at + 0.5 * window_);
     double variance = 0;
     for (std::size_t i = 0; i + 1 < rows.x().size(); ++i) {
@@ -245,8 +249,8 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
         const double of_model_place = shift_error(rows, at, model_resolution_ * at);
         const double of_sampling = sampling_error(rows, at, usual);
-        station.sigma = std::sqrt(of_noise * of_noise + of_sampling * of_sampling + of_data_place * of_data_place + of_model_place * of_model_place +
-                                  model_resolution_ * peak * model_resolution_ * peak);
+        const double of_model_force = model_resolution_ * peak;
+        station.sigma = Eigen::Vector<double, 5>(of_noise, of_sampling, of_data_place, of_model_place, of_model_force).norm();
         stations_.push_back(station);
     }
 }
@@ -256,7 +260,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
     const double from = rows.x().front();
     const double to = rows.x().back();
-    // Few rows are taken as they are: a window would draw a jump's ends into the rows beside it, which the model's many rows do not show.
+    // Few rows are taken as they are: a window would draw a jump's ends into the rows beside it, which the model's many rows do
+    // not show.
     const bool sparse = smoothing_window * static_cast<double>(rows.x().size()) < rows_in_a_window;
     arrival_window_ = sparse ? 0.0 : smoothing_window * (to - from);
     arrival_end_ = to;
@@ -272,7 +277,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
     const GrowthByRows growth_by_rows(rows, noise);
-    const double close = std::max(std::clamp(growth / 24, near_stations, far_stations), line_averages * growth_by_rows.steady_step());
+    const double close =
+        std::max(std::clamp(growth / 24, near_stations, far_stations), line_averages * growth_by_rows.steady_step());
     const double spacing = std::max(std::min(close, growth / 2), growth / most_arrivals);
     const std::size_t first = stations_.size();
     std::vector<double> reach;  // how far a station shares its rows with others [m] or [s]
@@ -289,9 +295,10 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         const double late = crack.arrival(length + reach_of_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
         const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
-        const double of_length = std::max(*arrival - early, late - *arrival);  // just before a jump and behind it one side says little
-        station.sigma = std::max(std::hypot(of_length / std::sqrt(line_averages), abscissa_noise_ / std::sqrt(averaged)), of_jump);
-        station.sigma = std::hypot(station.sigma, model_resolution_ * *arrival);
+        // Just before a jump and behind it one side says little.
+        const double of_length = std::max(*arrival - early, late - *arrival) / std::sqrt(line_averages);
+        const double of_data_place = abscissa_noise_ / std::sqrt(averaged);
+        station.sigma = std::hypot(std::max(std::hypot(of_length, of_data_place), of_jump), model_resolution_ * *arrival);
         stations_.push_back(station);
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
     }
@@ -305,7 +312,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
 }
 
 Eigen::VectorXd Comparison::modelled(const Record& record, double slack_force) const {
-    std::vector<double> values = fields_ && fields_->stations().size() == stations_.size() ? std::vector<double>{} : on_curves(record, slack_force);
+    const bool only_fields = fields_ && fields_->stations().size() == stations_.size();
+    std::vector<double> values = only_fields ? std::vector<double>{} : on_curves(record, slack_force);
     if (fields_) {
         const std::vector<double> of_fields = fields_->modelled(record);
         values.insert(values.end(), of_fields.begin(), of_fields.end());

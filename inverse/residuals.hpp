@@ -21,18 +21,19 @@ class Curve;
 /// curves get the same moving-window average, `smoothing_window` of the measured range wide, and the stations stand one
 /// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. With no
 /// more rows than that, a station stands on each row. Latewood bands that the crack crosses one by one leave peaks some
-/// tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next, as the crack jumps, when it did so is
-/// known to the rows' distance only, which counts as an error of its own.
+/// tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next, as the crack jumps,
+/// when it did so is known to the rows' distance only, which counts as an error of its own.
 ///
-/// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer than it grows from
-/// row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the slope taken over sigma_a to the flatter side. Where
-/// growth jumps, starts or ends between two rows it is no less than the rows' distance, so that a jump has no infinite weight. Stations
-/// reached within one window, or in one jump, share their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
+/// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer
+/// than it grows from row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the
+/// slope taken over sigma_a to the flatter side. Where growth jumps, starts or ends between two rows it is no less than
+/// the rows' distance, so that a jump has no infinite weight. Stations reached within one window, or in one jump, share
+/// their rows and count as one together. A model that never reaches a station gets its last displacement and, for the
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
 ///
-/// Force is compared where data exist. After the end of a Record the force is that of a slack machine if the specimen split, else the last
-/// one.
+/// Force is compared where data exist. After the end of a Record the force is that of a slack machine if the specimen
+/// split, else the last one.
 class Comparison {
   public:
     static constexpr double smoothing_window = 0.02;  // of the measured range

@@ -14,11 +14,15 @@
 namespace crampfit {
 namespace {
 
-// Parts of the box.
+// Parts of the box. The radius is that of the parameters in which the model of the runs nearby is of first order; in the others
+// it goes farther.
 constexpr double first_radius = 0.2;
+constexpr double reach_where_exact = 5.0;  // radii
 constexpr double last_radius = 0.03;
 constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
+constexpr double least_rise = 0.05;  // of the misfit, where noise is in it: a quarter of a standard error
+constexpr double free_of_noise = 0.01;  // of the misfit for each residual: below that it is rounding of data or model
 
 constexpr int points_a_parameter = 12;  // of a spread
 constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
@@ -110,16 +114,26 @@ void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, u
 namespace {
 
 // One descent; whether it ended by its own criterion.
-bool descend_from(Objective& objective, const Near& near, const Near& rough, const Eigen::VectorXd& start, unsigned seed) {
+bool descend_from(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, double enough, unsigned seed) {
     objective.at(start);
+    Eigen::VectorXd reach(start.size());  // in radii
+    for (Eigen::Index j = 0; j < reach.size(); ++j) {
+        reach[j] = nearby.exact[static_cast<std::size_t>(j)] ? reach_where_exact : 1.0;
+    }
     double radius = first_radius;
     while (objective.best() && !objective.exhausted() && radius >= least_radius) {
+        if (objective.best()->evaluation->misfit < enough) {
+            return true;
+        }
         const Run here = *objective.best();
         const auto expected_from = [&](const Run& trial) { return here.evaluation->misfit - trial.evaluation->misfit; };
-        const auto promises = [&](const Run& trial) { return expected_from(trial) > least_gain * here.evaluation->misfit; };
-        Run trial = lowest(rough(here.x), Window(here.x, radius), here.x, objective, seed);
+        const auto promises = [&](const Run& trial) {
+            const bool noisy = trial.evaluation->misfit > free_of_noise * static_cast<double>(trial.evaluation->residuals.size());
+            return expected_from(trial) > std::max(least_gain * here.evaluation->misfit, noisy ? least_rise : 0.0);
+        };
+        Run trial = lowest(nearby.rough(here.x), Window(here.x, radius * reach), here.x, objective, seed);
         if (!promises(trial)) {
-            trial = lowest(near(here.x), Window(here.x, last_radius), here.x, objective, seed);
+            trial = lowest(nearby.near(here.x), Window(here.x, last_radius), here.x, objective, seed);
         }
         if (!promises(trial)) {
             return !objective.stopped();
@@ -127,7 +141,7 @@ bool descend_from(Objective& objective, const Near& near, const Near& rough, con
         const double expected = expected_from(trial);
         objective.at(trial.x);
         const double gain = here.evaluation->misfit - objective.best()->evaluation->misfit;
-        const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
+        const double step = (trial.x - here.x).cwiseAbs().cwiseQuotient(reach).maxCoeff();
         radius = gain < 0.25 * expected ? 0.25 * std::min(radius, step) : std::clamp(2.0 * step, last_radius, first_radius);
     }
     return objective.best() != nullptr && radius < least_radius;
@@ -164,25 +178,25 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Near& 
 
 }  // namespace
 
-bool descend_again(Objective& objective, const Near& near, const Near& rough, bool ways_differ, unsigned seed) {
+bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed) {
     const Eigen::VectorXd start = objective.best()->x;
-    const bool converged = descend_from(objective, near, rough, start, seed);
+    const bool converged = descend_from(objective, nearby, start, 0.0, seed);
     // From way to way the misfit is rough: polynomials of the runs themselves see past that.
-    return ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
+    return nearby.ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
 }
 
-SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, bool ways_differ,
-                              const Eigen::VectorXd& initial, unsigned seed, const std::function<void(const std::string&)>& stage) {
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough, const Eigen::VectorXd& initial,
+                              unsigned seed, const std::function<void(const std::string&)>& stage) {
     const int p = static_cast<int>(initial.size());
     std::vector<Eigen::VectorXd> from{initial};
-    if (ways_differ) {
+    if (nearby.ways_differ) {
         stage("starts");
-        from = lowest_of_starts(objective, rough, initial, seed);
+        from = lowest_of_starts(objective, nearby.rough, initial, seed);
     }
     for (int i = static_cast<int>(from.size()); i < starts; ++i) {
         from.push_back(sobol_point(i, p, seed));
     }
-    const int least_descents = ways_differ ? descents_of_starts : 0;
+    const int least_descents = nearby.ways_differ ? descents_of_starts : 0;
     stage("descent");
     SearchResult result;
     double least = INFINITY;  // of the descents
@@ -190,7 +204,7 @@ SearchResult descend_by_walks(Objective& objective, const Near& near, const Near
     while (descents < static_cast<int>(from.size()) && !objective.exhausted() &&
            !(descents >= least_descents && objective.best() && is_explained(*objective.best()->evaluation, p))) {
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, near, rough, from[static_cast<std::size_t>(descents)], seed);
+        const bool converged = descend_from(branch, nearby, from[static_cast<std::size_t>(descents)], enough, seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {
@@ -202,7 +216,7 @@ SearchResult descend_by_walks(Objective& objective, const Near& near, const Near
         "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other toughnesses as "
         "they are, and other moduli moved by their exact derivatives. From {}, and from others, up to {}, while the "
         "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
-        ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
+        nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
         objective.runs().size());
     return result;
 }

@@ -4,24 +4,33 @@
 #include "inverse/search.hpp"
 
 #include <functional>
+#include <vector>
 
 namespace crampfit {
 
 /// The study near a point [parameters], cheap: exact in some parameters, to first order in the others.
 using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 
-/// Least squares where a run leaves behind a cheap model of the runs nearby, exact in some parameters and to first order in the
-/// others: each step searches that model within a trust region, runs the study where the model is lowest, and goes on from there if
-/// that is lower (Conn, Gould and Toint 2000, algorithm 6.1.1). The model is searched from several points, so that a curve
-/// with jumps does not easily catch it in a side valley. The search asks `rough`, which costs no equilibria; where that promises nothing
-/// more, `near` has the last word. It starts
-/// from `initial`, and from further Sobol points of the box, up to `starts`, as long as the noise does not explain the misfit. Where
-/// `ways_differ` from point to point, which the cheap model does not see, it starts from the lowest of some more such points anyway.
-SearchResult descend_by_walks(Objective& objective, const Near& near, const Near& rough, int starts, bool ways_differ,
-                              const Eigen::VectorXd& initial, unsigned seed, const std::function<void(const std::string&)>& stage);
+/// What a run leaves behind: a cheap model of the runs nearby.
+struct Nearby {
+    Near near;
+    Near rough;               // the same from what is known already, at no equilibria; for a search that `near` or a run confirms
+    std::vector<bool> exact;  // [parameters] in which they are; in the others to first order
+    bool ways_differ;         // from point to point, which they do not see
+};
 
-/// One more such descent, from the best run, after runs have been weighed anew. Whether it ended by its own criterion.
-bool descend_again(Objective& objective, const Near& near, const Near& rough, bool ways_differ, unsigned seed);
+/// Least squares where a run leaves behind a cheap model of the runs nearby: each step searches that model within a trust
+/// region, runs the study where the model is lowest, and goes on from there if that is lower (Conn, Gould and Toint 2000,
+/// algorithm 6.1.1). The model is searched from several points, so that a curve with jumps does not easily catch it in a side
+/// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where
+/// the misfit is below `enough`. It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as
+/// the noise does not explain the misfit. Where ways differ it starts from the lowest of some more such points anyway.
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough, const Eigen::VectorXd& initial,
+                              unsigned seed, const std::function<void(const std::string&)>& stage);
+
+/// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
+/// criterion.
+bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed);
 
 /// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.
 void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed);

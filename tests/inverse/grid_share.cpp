@@ -86,5 +86,29 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     EXPECT_NE(fit.message.find("is not told"), std::string::npos);
 }
 
+// A slack of 0 in a box of 100 um: a shift of 4 um is small beside half of that, one of 6 um is not; neither is a part of 0.
+TEST(UnitGridShare, TellsShiftsOfParametersNearZeroInTheirUnit) {
+    Parameter slack;
+    slack.name = "slack";
+    slack.lower = -50e-6;
+    slack.upper = 50e-6;
+    slack.unit = "um";
+    slack.unit_factor = 1e-6;
+    const UnitBox box({slack});
+    const auto fit_after = [&](double shift) {
+        Fit fit;
+        fit.parameters.push_back({.name = "slack", .key = "", .value = 0, .unit = "um", .lower_95 = -1, .upper_95 = 1});
+        fit.covariance = Eigen::MatrixXd::Identity(1, 1);
+        take_in_grid(fit, box, Eigen::VectorXd::Constant(1, 0.5), Eigen::VectorXd::Constant(1, shift / 100e-6));
+        return fit;
+    };
+    const Fit told = fit_after(4e-6), untold = fit_after(6e-6);
+    EXPECT_NEAR(told.parameters[0].upper_95, 5, 1e-9);
+    EXPECT_NEAR(told.covariance(0, 0), 1 + 16.0 / 3, 1e-9);
+    EXPECT_NE(told.message.find("'slack' +4 um."), std::string::npos) << told.message;
+    EXPECT_EQ(untold.parameters[0].upper_95, 1);
+    EXPECT_NE(untold.message.find("is not told"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace crampfit::testing

@@ -1,9 +1,11 @@
 #include "forward/simulate.hpp"
 #include "inverse/kept_walks.hpp"
+#include "inverse/stress_unit.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace crampfit::testing {
@@ -72,6 +74,52 @@ TEST(UnitKeptWalks, AnotherToughnessGoesItsOwnWay) {
             EXPECT_GT(apart(first, second), 0.05e-3);
         }
     }
+}
+
+// With every stiffness and every toughness 1.7 times as large nothing changes but the unit of stress: no equilibrium is solved
+// for anew.
+TEST(UnitKeptWalks, AnotherUnitOfStressIsOnTheSameWalk) {
+    Scene scene = across_inclined_rings(GrowthDirection::normal_to_opening);
+    Study study = toughness_study(scene);
+    for (const auto& [key, initial] : {std::pair{"materials.EW.E", 300e6}, {"materials.LW.E", 5000e6}}) {
+        Parameter parameter;
+        parameter.keys = {key};
+        parameter.initial = initial;
+        study.parameters.push_back(parameter);
+    }
+    const KeptWalks walks(study);
+    const Record first = walks.exact()(scene, nullptr);
+    multiply_stress(scene, 1.7);
+    const Record second = walks.exact()(scene, nullptr), alone = simulate(scene);
+    EXPECT_GT(first.steps, 0);
+    EXPECT_EQ(second.steps, 0);
+    ASSERT_EQ(second.series.size(), alone.series.size());
+    double most = 0;
+    for (std::size_t i = 1; i < alone.series.size(); ++i) {
+        const Instant &a = second.series[i], &b = alone.series[i];
+        most = std::max({most, std::abs(a.force / b.force - 1), std::abs(a.external_work / b.external_work - 1),
+                         std::abs(a.K_I / b.K_I - 1), std::abs(a.crack_length / b.crack_length - 1),
+                         std::abs(a.displacement / b.displacement - 1)});
+    }
+    std::printf("other unit of stress: within %.1e of a run of its own\n", most);
+    EXPECT_LT(most, 1e-9);
+    EXPECT_NEAR(second.driving[1].toughness, 1.7 * first.driving[1].toughness, 1e-9);
+}
+
+// What is loaded by forces, or flows at some stress, has another unit of stress.
+TEST(UnitStressUnit, IsRefusedWhereOtherStressHasASay) {
+    const Scene free = across_inclined_rings(GrowthDirection::straight);
+    EXPECT_EQ(stress_keys(free), (std::vector<std::string>{"materials.EW.E", "materials.LW.E"}));
+    Scene pulled = free, pressed = free, flowing = free, grained = free;
+    pulled.edges[0].traction = Vec2(0, 1e6);
+    pressed.bodies.emplace_back().free[1] = true;
+    flowing.materials["LW"].plastic = Plasticity{};
+    EXPECT_TRUE(stress_keys(pulled).empty());
+    EXPECT_TRUE(stress_keys(pressed).empty());
+    EXPECT_TRUE(stress_keys(flowing).empty());
+    grained.materials["EW"].orthotropic = OrthotropicElasticity{.E_R = 8e8, .E_T = 4e8, .G_RT = 4e7};
+    EXPECT_EQ(stress_keys(grained),
+              (std::vector<std::string>{"materials.EW.E_R", "materials.EW.E_T", "materials.EW.G_RT", "materials.LW.E"}));
 }
 
 }  // namespace

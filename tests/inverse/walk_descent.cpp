@@ -33,7 +33,8 @@ TEST(UnitWalkDescent, FindsTheLowestPointInFewRuns) {
         const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
             return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
         };
-        const SearchResult found = descend_by_walks(objective, near, near, 1, false, Eigen::Vector2d(first, second), 1, [](const std::string&) {});
+        const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(first, second), 1,
+                                                    [](const std::string&) {});
         ASSERT_NE(objective.best(), nullptr);
         const Eigen::VectorXd best = objective.best()->x;
         std::printf("from (%.1f, %.1f): %zu runs, off by %.1e\n", first, second, objective.runs().size(),
@@ -50,7 +51,8 @@ TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
     const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
         return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
     };
-    const SearchResult found = descend_by_walks(objective, near, near, 1, false, Eigen::Vector2d(0.1, 0.9), 1, [](const std::string&) {});
+    const SearchResult found =
+        descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(0.1, 0.9), 1, [](const std::string&) {});
     EXPECT_FALSE(found.converged);
     EXPECT_EQ(objective.runs().size(), 2u);
 }
