@@ -114,7 +114,7 @@ class Quasistatic {
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, Slopes> slopes;                   // their derivatives
         std::map<int, std::vector<Vec2>> probes;        // what they read, whatever the shift; in a linear scene of times 0 and last
-        std::vector<std::optional<TipBoxes>> boxes;      // [growing] about the tips' next advance; none: nothing is missed
+        std::vector<std::optional<TipBoxes>> boxes;     // [growing] about the tips' next advance; none: nothing is missed
         std::set<int> guessed;                          // times at which the station's state is no more than roughly known
     };
 
@@ -155,7 +155,8 @@ class Quasistatic {
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
     std::optional<Slopes> slopes_here(const Missed& missed);
-    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end, std::vector<LoadState>& slopes) const;
+    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
+                    std::vector<LoadState>& slopes) const;
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     std::vector<std::optional<TipBoxes>> boxes_ahead() const;
