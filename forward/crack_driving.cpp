@@ -29,7 +29,8 @@ LoadState weighted(const std::vector<const LoadState*>& states, const std::vecto
         sum.potential += w * s.potential;
         sum.power += w * s.power;
         sum.traction_work += w * s.traction_work;
-        sum.missed += w * s.missed;
+        sum.end_potential += w * s.end_potential;
+        sum.end_power += w * s.end_power;
         sum.dissipated += w * s.dissipated;
         sum.displacement += w * s.displacement;
         for (std::size_t d = 0; d < sum.reactions.size(); ++d) sum.reactions[d] += w * s.reactions[d];
@@ -67,8 +68,9 @@ LoadState scaled(const LoadState& state, double factor) {
     LoadState at = state;
     at.time *= factor;
     at.potential *= factor * factor;
-    at.missed *= factor * factor;
+    at.end_potential *= factor * factor;
     at.power *= factor;
+    at.end_power *= factor;
     at.traction_work *= factor;
     at.displacement *= factor;
     for (Vec2& r : at.reactions) r *= factor;
@@ -86,6 +88,7 @@ LoadState between(const LoadState& from, const LoadState& to, double time) {
     const double s = (time - from.time) / span;
     LoadState found = weighted({&from, &to}, {1.0 - s, s});
     found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
+    found.end_potential = cubic(from.end_potential, span * from.end_power, to.end_potential, span * to.end_power, s);
     return found;
 }
 
@@ -115,6 +118,7 @@ LoadState LoadState::gone_on(double to) const {
     LoadState at = scaled(*this, std::pow(ratio, exponent - 1.0));
     at.time = to;
     at.potential = potential * std::pow(ratio, exponent);
+    at.end_potential = end_potential * std::pow(ratio, exponent);
     at.displacement = displacement * ratio;
     for (std::size_t k = 0; k < tips.size(); ++k) at.tips[k].G = tips[k].G * std::pow(ratio, exponent);
     return at;
@@ -138,7 +142,8 @@ void extrapolate(LoadState& fine, const LoadState& coarse) {
     improve(fine.potential, coarse.potential);
     improve(fine.power, coarse.power);
     improve(fine.traction_work, coarse.traction_work);
-    improve(fine.missed, coarse.missed);
+    improve(fine.end_potential, coarse.end_potential);
+    improve(fine.end_power, coarse.end_power);
     improve(fine.dissipated, coarse.dissipated);
     improve(fine.displacement, coarse.displacement);
     for (std::size_t d = 0; d < fine.reactions.size(); ++d) improve(fine.reactions[d], coarse.reactions[d]);

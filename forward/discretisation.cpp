@@ -211,7 +211,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
             const Vec2 corner = size.cwiseProduct(Vec2(column, row));
             const auto [share, x] = extent.leave_of({corner, corner + size});
             if (share < least_share) continue;
-            if (materials.at(x).filled == 0.0) continue;
+            if (!materials.has_wood_at(x)) continue;
             points.lattice[static_cast<std::size_t>(row) * columns + column] = points.count();
             points.position.push_back(x);
             points.cell.push_back(c);

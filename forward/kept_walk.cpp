@@ -18,7 +18,7 @@ KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, 
 Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool rough) {
     const auto start = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
-    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, numbers_, threads_);
+    if (!walk_ || !walk_->failure().empty()) walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, Discretisation(scene_, materials_), numbers_, threads_);
     const int known = walk_->equilibria();
     std::vector<double> by;
     for (const std::string& key : numbers_) {

@@ -203,6 +203,10 @@ LocalWood MaterialMap::at_place(const Vec2& x) const {
     return wood;
 }
 
+bool MaterialMap::has_wood_at(const Vec2& x) const {
+    return !scene_.specimen.map || scene_.specimen.map->label[pixel_at(x + corner_)] != Specimen::void_label;
+}
+
 // The wood of a rectangle that lies within one band of the rings; null where it may hold others.
 const LocalWood* MaterialMap::band_around(const Vec2& centre, const Vec2& half) const {
     if (!scene_.specimen.rings || scene_.specimen.map || orthotropic_) return nullptr;

@@ -48,6 +48,9 @@ class MaterialMap {
     /// At a place. Outside a picture the nearest pixel counts, so that rounding at the edge costs no points.
     LocalWood at(const Vec2& x) const;
 
+    /// Whether there is any at a place.
+    bool has_wood_at(const Vec2& x) const;
+
     /// Averaged over an upright rectangle: elasticity as layers across the direction in which the wood changes most, the rest by
     /// area.
     LocalWood average(const Vec2& centre, const Vec2& half) const;

@@ -76,8 +76,8 @@ void WayFinder::to(const Record& record, const SeriesPlace& place) {
     while ((share_ = share_gone(record, place)) == 1.0) ++station_;
 }
 
-Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk)
-    : walk_(walk), finder_(walk), body_(scene, materials), equilibrium_(scene, plan, materials, body_) {}
+Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk)
+    : walk_(walk), finder_(walk), body_(body), equilibrium_(scene, plan, materials, body_) {}
 
 // Moves the tips that move on from the station by this share of the way to the next.
 void Revisit::grow(double share) {

@@ -46,8 +46,8 @@ class WayFinder {
 /// were then.
 class Revisit {
   public:
-    /// All of them must outlive this.
-    Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk);
+    /// All of them must outlive this, but for `body`: the specimen at rest, without cracks.
+    Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk);
 
     /// Goes to a place of the walk's record, no earlier than the last one. False where there is no equilibrium.
     bool to(const Record& record, const SeriesPlace& place);

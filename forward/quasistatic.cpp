@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <future>
 #include <limits>
@@ -18,11 +19,6 @@ constexpr double increment_in_cells = 0.5;
 // cheap, in more, and in more still about a narrow peak of the load that the crack needs. With two, latewood of three cells and 30 times as stiff
 // puts fitted toughnesses off by 5 to 10 %, with four by 0.5 (`scripts/virtual_wedges --scene opened --finer --seed 103`).
 constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4, least_stations_in_peak = 8;
-
-// Of what the grid says that an advance releases, what is missed at its ends takes no more than this leaves: at a sharp boundary 30 : 1 the grid
-// gives up to one and a half of the true energy (`VerificationFineTip`). Along boundaries that lie askew the wood in the boxes, taken anew on finer
-// cells, changes from one box to the next by more than that, and would stop a crack for good.
-constexpr double least_share_of_grid = 0.5;
 
 // Into how many steps the loading of a scene that is not linear is divided.
 constexpr int loading_steps = 32;
@@ -50,20 +46,20 @@ struct Quasistatic::Coarse {
     bool side_by_side;  // with the finer grid's
 
     Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, numbers, threads, &leader), side_by_side(threads > 1) {}
+        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, Discretisation(scene, materials), numbers, threads, &leader), side_by_side(threads > 1) {}
 };
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
-                         int threads)
-    : Quasistatic(scene, plan, materials, numbers, threads, nullptr) {
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                         const std::vector<std::string>& numbers, int threads)
+    : Quasistatic(scene, plan, materials, body, numbers, threads, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
 }
 
-Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers,
-                         int threads, const Quasistatic* leader)
-    : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(scene, materials),
-      equilibrium_(scene, plan, materials, body_, threads) {
+Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                         const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
+    : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body), equilibrium_(scene, plan, materials, body_, threads),
+      fine_tip_(scene, plan, materials, body_, numbers_) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -94,36 +90,37 @@ bool Quasistatic::fail() {
     return false;
 }
 
-LoadState Quasistatic::load_state() const {
-    LoadState state;
-    state.time = equilibrium_.time();
-    state.potential = equilibrium_.potential();
-    state.power = equilibrium_.power();
-    state.traction_work = equilibrium_.traction_work();
-    state.dissipated = equilibrium_.dissipated();
-    state.displacement = equilibrium_.measured_displacement(state.time);
-    state.reactions = equilibrium_.reactions();
-    for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
-        for (const bool at_end : {false, true})
-            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end) : TipLoad{});
-    const double energy = missed({}).energy;
-    if (!equilibrium_.boundary().has_dead_load() && energy != 0.0) {  // force goes with energy
-        const double ratio = 1.0 + energy / state.potential;
-        state.power *= ratio;
-        for (Vec2& r : state.reactions) r *= ratio;
+// Boxes about the tips whose next advance counts, as if they went straight on.
+std::vector<std::optional<TipBoxes>> Quasistatic::boxes_ahead() const {
+    std::vector<std::optional<TipBoxes>> boxes(growing_.size());
+    for (std::size_t t = 0; t < growing_.size() && !plan_.remembers; ++t) {
+        const auto& [crack, at_end, increment, ahead] = growing_[t];
+        const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
+        if (ahead == 0 || !tip.inside) continue;
+        boxes[t] = fine_tip_.about(equilibrium_.cracks(), crack, tip.position, tip.position + static_cast<double>(ahead) * increment * tip.direction);
     }
-    state.potential += energy;
-    state.missed = energy;
-    return state;
+    return boxes;
 }
 
-// At all tips whose next advance counts.
-MissedEnergy Quasistatic::missed(const std::vector<MaterialSlope>& numbers) const {
+// The place whose next advance ends at this one; -1: none does.
+int Quasistatic::start_of_advance(int end) const {
+    const Step step = places_[end].step;
+    int place = places_[end].parent;
+    if (place < 0 || step.tips == 0) return -1;
+    const auto go_back = [&] { place = place >= 0 && places_[place].step == Step{step.tips} ? places_[place].parent : -1; };
+    for (std::size_t k = 1; k < growing_[std::countr_zero(step.tips)].ahead; ++k) go_back();
+    if (step.quarters == Step{}.quarters) return place;
+    go_back();
+    if (place < 0) return -1;
+    const auto start = places_[place].next.find(step);
+    return start == places_[place].next.end() ? -1 : start->second;
+}
+
+MissedEnergy Quasistatic::missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes) {
     MissedEnergy all;
-    if (plan_.remembers) return all;
-    for (const GrowingTip& tip : growing_) {
-        if (tip.ahead == 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
-        const MissedEnergy one = energy_missed_at_tip(scene_, plan_, materials_, body_, equilibrium_, tip.crack, tip.at_end, numbers);
+    for (std::size_t t = 0; t < growing_.size(); ++t) {
+        if (!boxes[t]) continue;
+        const MissedEnergy one = fine_tip_.missed(*boxes[t], equilibrium_, growing_[t].crack, growing_[t].at_end, with_slopes);
         all.energy += one.energy;
         if (one.by_number.empty()) continue;
         all.by_number.resize(one.by_number.size());
@@ -132,6 +129,42 @@ MissedEnergy Quasistatic::missed(const std::vector<MaterialSlope>& numbers) cons
         for (std::size_t f = 0; f < one.by_displacement.size(); ++f) all.by_displacement[f] += one.by_displacement[f];
     }
     return all;
+}
+
+// At a place where the equilibrium stands.
+Quasistatic::Missed Quasistatic::missed_at(std::size_t number, bool with_slopes) {
+    const Place& place = places_[number];
+    const MissedEnergy here = missed_in(place.boxes, with_slopes);
+    const int start = start_of_advance(static_cast<int>(number));
+    if (start < 0) return {here, here};
+    // A tip that has turned out of the boxes is seen in its own.
+    std::vector<std::optional<TipBoxes>> boxes = places_[start].boxes;
+    for (std::size_t t = 0; t < growing_.size(); ++t) {
+        const CrackTip& tip = equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end);
+        if (boxes[t] && tip.inside && !boxes[t]->hold(tip.position, body_.layout.cell)) boxes[t] = place.boxes[t];
+    }
+    return {here, missed_in(boxes, with_slopes)};
+}
+
+LoadState Quasistatic::load_state(const Missed& missed) const {
+    LoadState state;
+    state.time = equilibrium_.time();
+    const double potential = equilibrium_.potential(), power = equilibrium_.power();
+    const auto ratio = [&](const MissedEnergy& m) {  // force goes with energy
+        return !equilibrium_.boundary().has_dead_load() && m.energy != 0.0 ? 1.0 + m.energy / potential : 1.0;
+    };
+    state.potential = potential + missed.here.energy;
+    state.power = ratio(missed.here) * power;
+    state.end_potential = potential + missed.as_end.energy;
+    state.end_power = ratio(missed.as_end) * power;
+    state.traction_work = equilibrium_.traction_work();
+    state.dissipated = equilibrium_.dissipated();
+    state.displacement = equilibrium_.measured_displacement(state.time);
+    for (const Vec2& r : equilibrium_.reactions()) state.reactions.push_back(ratio(missed.here) * r);
+    for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
+        for (const bool at_end : {false, true})
+            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end) : TipLoad{});
+    return state;
 }
 
 // A specimen in pieces that nothing holds together carries nothing.
@@ -170,11 +203,12 @@ bool Quasistatic::know_linear(std::size_t number) {
         const auto [second, good] = on_both_grids(follow, [&] { return solve(2); });
         if (!second) return false;
         if (!good && !places_[number].station.left) return false;
-        const LoadState full = good ? load_state() : nothing(time_of(2));
+        const Missed missed = good ? missed_at(number, !numbers_.empty()) : Missed{};
+        const LoadState full = good ? load_state(missed) : nothing(time_of(2));
         if (good) keep_probes(number, 2);
         Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};
         if (good && !numbers_.empty()) {
-            auto here = slopes_here();
+            auto here = slopes_here(missed);
             if (!here) return false;
             slopes = std::move(*here);
         }
@@ -199,10 +233,11 @@ bool Quasistatic::know_linear(std::size_t number) {
         for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
         for (std::size_t d = 0; d < moved.size(); ++d) between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
         equilibrium_.set_displacements(u, time_of(time), between);
-        keep(number, time, load_state());
+        const Missed missed = missed_at(number, !numbers_.empty());
+        keep(number, time, load_state(missed));
         if (time != 1) keep_probes(number, time);
         if (numbers_.empty()) continue;
-        auto slopes = slopes_here();
+        auto slopes = slopes_here(missed);
         if (!slopes) return false;
         keep_slopes(number, time, std::move(*slopes));
     }
@@ -359,7 +394,7 @@ bool Quasistatic::find(std::size_t number, int time) {
     if (good) {
         if (!scene_.output.probes.places.empty()) equilibrium_.refine();
         place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
-        keep(number, time, load_state());
+        keep(number, time, load_state(missed_at(number, false)));
         keep_probes(number, time);
         return true;
     }
@@ -374,15 +409,8 @@ bool Quasistatic::know_ahead(std::size_t number, int time) {
     Place& place = places_[number];
     if (place.station.moving.empty() || place.station.moving.front().route.size() < 2) return true;
     if (!plan_.linear && !know(place.further, time)) return false;
-    const LoadState &here = place.station.states.at(time), &there = places_[place.further].station.states.at(time);
-    double potential = there.potential, power = there.power;
-    const double by_grid = here.potential - here.missed - (there.potential - there.missed);
-    if (here.potential - potential < least_share_of_grid * by_grid) {
-        const auto grid_power = [](const LoadState& s) { return s.potential != 0.0 ? s.power * (1.0 - s.missed / s.potential) : s.power; };
-        potential = here.potential - least_share_of_grid * by_grid;
-        power = here.power - least_share_of_grid * (grid_power(here) - grid_power(there));
-    }
-    place.station.ahead[time] = {potential, power};
+    const LoadState& there = places_[place.further].station.states.at(time);
+    place.station.ahead[time] = {there.end_potential, there.end_power};
     return true;
 }
 

@@ -32,10 +32,10 @@ namespace crampfit {
 /// taken off: errors go with the square of the cell (Richardson 1911). G and K at the tips stay those of the finer grid.
 class Quasistatic {
   public:
-    /// `scene`, `plan` and `materials` must outlive this.
+    /// `scene`, `plan` and `materials` must outlive this; `body` is the specimen at rest, without cracks.
     /// `numbers`: keys of numbers of the materials by which derivatives are wanted.
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers = {},
-                int threads = 1);
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                const std::vector<std::string>& numbers = {}, int threads = 1);
     ~Quasistatic();
 
     /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
@@ -85,6 +85,10 @@ class Quasistatic {
         std::vector<LoadState> states;
         std::vector<std::vector<Vec2>> probes;          // [readings] of the scene's [m]; empty: none
     };
+    struct Missed {                                     // by the grid where the equilibrium stands
+        MissedEnergy here;                              // seen in the boxes for the advance from there
+        MissedEnergy as_end;                            // and in those for the advance that ends there
+    };
     struct GrowingTip {
         int crack;
         bool at_end;
@@ -110,11 +114,12 @@ class Quasistatic {
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, Slopes> slopes;                   // their derivatives
         std::map<int, std::vector<Vec2>> probes;        // what they read, whatever the shift; in a linear scene of times 0 and last
+        std::vector<std::optional<TipBoxes>> boxes;     // [growing] about the tips' next advance; none: nothing is missed
         std::set<int> guessed;                          // times at which the station's state is no more than roughly known
     };
 
-    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const std::vector<std::string>& numbers, int threads,
-                const Quasistatic* leader);
+    Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                const std::vector<std::string>& numbers, int threads, const Quasistatic* leader);
     int add_place(int parent, Step step);
     int next(int number, Step step, double now);
     Vec2 next_tip(const GrowingTip& growing, const LoadState* state, int quarters) const;
@@ -149,11 +154,16 @@ class Quasistatic {
     void keep_slopes(std::size_t number, int time, Slopes slopes);
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
-    std::optional<Slopes> slopes_here();
+    std::optional<Slopes> slopes_here(const Missed& missed);
+    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
+                    std::vector<LoadState>& slopes) const;
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
-    LoadState load_state() const;
-    MissedEnergy missed(const std::vector<MaterialSlope>& numbers) const;
+    std::vector<std::optional<TipBoxes>> boxes_ahead() const;
+    int start_of_advance(int end) const;
+    Missed missed_at(std::size_t number, bool with_slopes);
+    MissedEnergy missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes);
+    LoadState load_state(const Missed& missed) const;
     LoadState nothing(double time) const;
     double time_of(int number) const { return number * time_step_; }
 
@@ -164,6 +174,7 @@ class Quasistatic {
     Discretisation body_;
     Equilibrium equilibrium_;
     std::vector<MaterialSlope> numbers_;
+    FineTip fine_tip_;
     std::vector<double> shift_;                   // [numbers]; empty: none
     std::deque<Place> places_;                    // parents first
     bool rough_ = false;

@@ -55,6 +55,7 @@ int Quasistatic::add_place(int parent, Step step) {
     for (std::size_t t = 0; t < growing_.size(); ++t)
         if (equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) place.inside |= 1u << t;
     station.left = place.inside == 0;
+    place.boxes = boxes_ahead();
     if (!plan_.linear || growing_.size() > 1 || closer_ > 1) place.snapshot = equilibrium_.save();
     if (plan_.linear && growing_.size() == 1 && places_.size() > kept_places) places_[places_.size() - 1 - kept_places].snapshot.reset();
     entered_ = &place;
@@ -172,7 +173,7 @@ bool Quasistatic::extend(double now) {
 double Quasistatic::released(int number, int time) {
     const int further = places_[number].further;
     if (!know_exactly(number, time) || !know_exactly(further, time)) return -1.0;
-    return places_[number].states.at(time).potential - places_[further].states.at(time).potential;
+    return places_[number].states.at(time).potential - places_[further].states.at(time).end_potential;
 }
 
 // Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of narrowly

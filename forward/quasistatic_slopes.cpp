@@ -44,7 +44,7 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
 }
 
 // Derivatives of the state where the equilibrium stands. What is prescribed has none.
-std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
+std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed) {
     const Boundary& boundary = equilibrium_.boundary();
     const Gauges gauges(scene_);
     std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
@@ -65,22 +65,13 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
         if (!pulled.empty()) found[n].displacement = -slope.along(motions[2], n);
         found[n].tips.resize(2 * scene_.cracks.size());
     }
-    if (const MissedEnergy energy = missed(numbers_); !energy.by_number.empty()) {
-        std::vector<Vec2> load = energy.by_displacement;
-        for (Vec2& f : load) f *= -1.0;
-        const Equilibrium::Motion yielding = equilibrium_.yield_to(load);
-        const double potential = equilibrium_.potential(), ratio = 1.0 + energy.energy / potential;
-        for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
-            const double more = energy.by_number[n] + slope.along(yielding, n);
-            if (!boundary.has_dead_load()) {
-                const double ratio_slope = (more - energy.energy * found[n].potential / potential) / potential;
-                found[n].power = ratio * found[n].power + ratio_slope * equilibrium_.power();
-                found[n].reactions[gauges.force] = ratio * found[n].reactions[gauges.force] +
-                    ratio_slope * equilibrium_.reactions()[gauges.force].dot(gauges.force_direction) * gauges.force_direction;
-            }
-            found[n].potential += more;
-        }
+    for (LoadState& of_number : found) {
+        of_number.end_potential = of_number.potential;
+        of_number.end_power = of_number.power;
     }
+    const std::vector<LoadState> of_grid = found;
+    if (!missed.here.by_number.empty()) add_slopes(missed.here, slope, of_grid, false, found);
+    if (!missed.as_end.by_number.empty()) add_slopes(missed.as_end, slope, of_grid, true, found);
     std::vector<std::vector<Vec2>> moved;
     Slopes all;
     if (!scene_.output.probes.places.empty()) {
@@ -100,6 +91,26 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here() {
     return all;
 }
 
+// Adds the derivatives of what the grid misses to its own.
+void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
+                             std::vector<LoadState>& slopes) const {
+    const int gauge = Gauges(scene_).force;
+    const Vec2 direction = Gauges(scene_).force_direction;
+    std::vector<Vec2> load = missed.by_displacement;
+    for (Vec2& f : load) f *= -1.0;
+    const Equilibrium::Motion yielding = equilibrium_.yield_to(load);
+    const double potential = equilibrium_.potential(), ratio = 1.0 + missed.energy / potential;
+    for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
+        const double more = missed.by_number[n] + slope.along(yielding, n);
+        (as_end ? slopes[n].end_potential : slopes[n].potential) += more;
+        if (equilibrium_.boundary().has_dead_load()) continue;
+        const double ratio_slope = (more - missed.energy * of_grid[n].potential / potential) / potential;
+        (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium_.power();
+        if (!as_end)
+            slopes[n].reactions[gauge] = ratio * of_grid[n].reactions[gauge] + ratio_slope * equilibrium_.reactions()[gauge].dot(direction) * direction;
+    }
+}
+
 // Puts what the shift makes of a state in its place. To first order; as powers of the numbers, which is exact where all the wood
 // becomes stiffer by the same factor, and where a value would change too much for that, linearly.
 void Quasistatic::show_shifted(std::size_t number, int time) {
@@ -115,6 +126,8 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
     };
     move(state.potential, [](const LoadState& s) { return s.potential; });
     move(state.power, [](const LoadState& s) { return s.power; });
+    move(state.end_potential, [](const LoadState& s) { return s.end_potential; });
+    move(state.end_power, [](const LoadState& s) { return s.end_power; });
     move(state.displacement, [](const LoadState& s) { return s.displacement; });
     for (std::size_t d = 0; d < state.reactions.size(); ++d)
         for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
@@ -145,7 +158,7 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
     if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
         enter(place);
         equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
-        auto here = slopes_here();
+        auto here = slopes_here(missed_at(number, true));
         if (!here) return false;
         slopes = std::move(*here);
     }

@@ -51,8 +51,8 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
 }
 
 // Frames at even times.
-void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
-    Revisit revisit(scene, plan, materials, walk);
+void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk, Record& record) {
+    Revisit revisit(scene, plan, materials, body, walk);
     record.point_position = revisit.body().points.position;
     record.point_size = revisit.body().layout.point_size();
     record.point_latewood = revisit.body().points.latewood;
@@ -77,7 +77,8 @@ bool small_strain_is_a_guess(const Scene& scene, const Plan& plan, const Record&
 
 // Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest that the
 // edges go while the specimen carries a load.
-void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk, Record& record) {
+void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk,
+                        Record& record) {
     constexpr double carries = 0.1;  // of the largest strain energy
     constexpr double counts = 0.02;
     const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
@@ -89,7 +90,7 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
         Plan turned = plan;
         turned.rotates = rotates;
         turned.linear = plan.linear && !rotates;
-        Revisit revisit(scene, turned, materials, walk);
+        Revisit revisit(scene, turned, materials, body, walk);
         return revisit.to(record, place) ? revisit.equilibrium().power() : 0.0;
     };
     const double without = power(false), with = without != 0.0 ? power(true) : 0.0;
@@ -110,8 +111,9 @@ Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& mate
     });
 }
 
-Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const SimulateOptions& options) {
-    Quasistatic walk(scene, plan, materials, {}, options.threads);
+Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                       const SimulateOptions& options) {
+    Quasistatic walk(scene, plan, materials, body, {}, options.threads);
     const auto go_on = [&](double time, double crack_length) {
         if (options.progress) {
             const double by_time = time / plan.end_time;
@@ -123,9 +125,9 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     Record record = trace(scene, plan, materials, walk, go_on);
     record.steps = walk.equilibria();
     record.points = walk.points();
-    if (scene.output.frames > 0) draw_frames(scene, plan, materials, walk, record);
+    if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, record);
     read_probes(scene, walk, record);
-    if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, walk, record);
+    if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, body, walk, record);
     return record;
 }
 
@@ -183,7 +185,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     const Plan plan = make_plan(scene, materials, body);
     Record record = !plan.quasistatic ? run_explicit(scene, plan, materials, body, options)
                     : plan.remembers  ? run_in_time(scene, plan, materials, body, options)
-                                      : run_quasistatic(scene, plan, materials, options);
+                                      : run_quasistatic(scene, plan, materials, body, options);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);
     if (!plan.quasistatic) record.explanation += fmt::format("{:<15} kinetic energy up to {:.2g} times the strain energy\n", "motion", kinetic_share(record));

@@ -495,10 +495,11 @@ TEST(UnitKeptWalk, OtherToughnessesWithFiniteRotation) {
 
 Record traced(const Scene& scene, bool linear) {
     const MaterialMap materials(scene);
-    Plan plan = make_plan(scene, materials, Discretisation(scene, materials));
+    const Discretisation body(scene, materials);
+    Plan plan = make_plan(scene, materials, body);
     plan.linear = linear;
     plan.rotates = !linear;
-    Quasistatic walk(scene, plan, materials);
+    Quasistatic walk(scene, plan, materials, body);
     return trace(scene, plan, materials, walk, {});
 }
 
