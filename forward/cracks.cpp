@@ -316,7 +316,7 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         const bool node_is_left = is_left(k, x);
         pairs.push_back({node_is_left ? with_node : beyond, node_is_left ? beyond : with_node, with_node, node, k,
                          left_of(lines[k].direction_near(true, x)), on_the_way, along, plane_modulus,
-                         pair_compliance / (plane_modulus * body_->layout.thickness), 1.0, 0.0});
+                         pair_compliance / (plane_modulus * body_->layout.thickness), 0.0, 0.0});
     }
 }
 
@@ -333,7 +333,9 @@ void CrackFields::renew_ties(int crack) {
     constexpr double smallest = 1e-6;
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
-        pair.freed = freed(crack, pair.node);
+        const double now = freed(crack, pair.node);
+        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come to.
+        if (pair.freed < 1.0 || now <= 0.0) pair.freed = now;
         const double f = std::max({least_freed_, pair.freed, smallest});
         pair.tie = (1.0 - f) / (f * pair.compliance);
     }
