@@ -101,19 +101,30 @@ Uncertainty CloseLook::in_box() const {
     return result;
 }
 
-CloseLook look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
-                     const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed) {
-    const auto look = [&](const Window& window) {
+std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
+                                    const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed) {
+    // Nothing where the user's stop comes before the first run.
+    const auto look = [&](const Window& window) -> std::optional<CloseLook> {
         const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) { return near(window.inside(y), threads); };
         CloseLook here{window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()), {}};
         spread_about(here.objective, window.share(x), difference_step, seed);
+        if (!here.objective.best()) {
+            return std::nullopt;
+        }
         here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step);
         return here;
     };
-    const CloseLook first = look(as_wide_as_the_misfit_says(near, x));
-    CloseLook found = first;
-    while (!all_told(found.uncertainty) && !is_whole(found.window) && !objective.stopped()) {
-        found = look(wider(found.window, x));
+    const auto first = look(as_wide_as_the_misfit_says(near, x));
+    if (!first) {
+        return std::nullopt;
+    }
+    CloseLook found = *first;
+    while (!all_told(found.uncertainty) && !is_whole(found.window)) {
+        auto here = look(wider(found.window, x));
+        if (!here) {
+            break;
+        }
+        found = std::move(*here);
     }
     for (int round = 0; round < most_rounds && all_told(found.uncertainty) && !objective.stopped(); ++round) {
         const Eigen::VectorXd errors = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());
@@ -122,18 +133,18 @@ CloseLook look_close(const Objective& objective, const Objective::Evaluate& near
         if (ratio.maxCoeff() < agreement && ratio.minCoeff() > 1 / agreement) {
             break;
         }
-        CloseLook here = look(wanted);
-        if (!all_told(here.uncertainty)) {
+        auto here = look(wanted);
+        if (!here || !all_told(here->uncertainty)) {
             break;
         }
-        found = std::move(here);
+        found = std::move(*here);
     }
-    CloseLook profiled = all_told(found.uncertainty) ? found : first;
-    for (int i = 0; i < most_profiles && !objective.stopped(); ++i) {
-        if (take_profile(profiled)) {
+    auto profiled = std::optional(all_told(found.uncertainty) ? found : *first);
+    for (int i = 0; i < most_profiles && profiled && !objective.stopped(); ++i) {
+        if (take_profile(*profiled)) {
             return profiled;
         }
-        profiled = look(wider(profiled.window, x));
+        profiled = look(wider(profiled->window, x));
     }
     return found;
 }

@@ -243,8 +243,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             const Eigen::VectorXd x = objective.best()->x;
             wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, run_on_wide_cells, std::cref(study), box.values(x),
                               options.stop_requested);
-            close.emplace(look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed));
-            return close->uncertainty;
+            close = look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed);
+            return close ? close->uncertainty : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
         };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {

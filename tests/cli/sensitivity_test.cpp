@@ -89,7 +89,7 @@ TEST(SystemCommand, KilledSensitivityGoesOnToTheSameBits) {
     command.folder.write("study.toml", study);
     const auto words = [&](const std::string& output) {
         return std::vector<std::string>{"sensitivity", command.path("study.toml"), "-o", command.path(output), "--quiet",
-                                        "--resume", "--set", "sensitivity.method=sobol"};
+                                        "--resume", "--set", "sensitivity.method=sobol", "--set", "sensitivity.samples=1024"};
     };
     std::size_t kept = 0;
     for (int i = 0; i < 3; ++i) {
