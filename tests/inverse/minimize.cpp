@@ -1,4 +1,5 @@
 #include "inverse/minimize.hpp"
+#include "inverse/close_look.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/local_model.hpp"
 #include "inverse/pool.hpp"
@@ -7,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <set>
@@ -284,6 +286,31 @@ TEST(UnitSearch, StartsFillTheBoxEvenly) {
         EXPECT_EQ(cells.size(), 16u);  // one in each: a (0, 4, 2)-net in base 2 (Sobol 1967)
     }
     EXPECT_NE(sobol_point(1, 2, 1u), sobol_point(1, 2, 2u));
+}
+
+// A user's stop may come at any moment, before the first run of a window too.
+TEST(UnitCloseLook, GivesWhatIsKnownWhenTheUserStops) {
+    const VectorXd lowest = Vector2d(0.6, 0.3);
+    int looks = 0;
+    for (int runs = 0; runs < 400; runs += 3) {
+        std::atomic<bool> stop = false;
+        std::atomic<int> left = runs;
+        const auto evaluate = [&](const VectorXd& x, int) {
+            if (left-- <= 0) stop = true;
+            return curved(x);
+        };
+        const Objective objective(2, curved, 100, 1, &stop);
+        const auto look = look_close(objective, evaluate, lowest, {3}, {"a", "b"}, 1);
+        if (!look) {
+            EXPECT_TRUE(stop) << runs;
+            continue;
+        }
+        ++looks;
+        EXPECT_TRUE(look->objective.best()) << runs;
+        EXPECT_TRUE(look->in_box().best.evaluation) << runs;
+    }
+    EXPECT_GT(looks, 10);
+    EXPECT_LT(looks, 130);
 }
 
 }  // namespace
