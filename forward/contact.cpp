@@ -16,10 +16,11 @@ constexpr double search_margin = 2.0;  // in cells; parts move by far less betwe
 constexpr double stiffness_in_cells = 10.0;
 
 // Width of the surface with whose mean a facet goes under a round body, and the most of it in radii: the mean of a wheel's own bend lies
-// width^2 / (24 radius) within it, which stiffens the contact. Forces on the wheels of the wedge sample, ten cells across, are within 2.7 %
-// of those on cells half as wide all the way; with facets that go alone 5.4 %, with one and a half cells 4.6 %.
+// width^2 / (24 radius) within it, which stiffens the contact. Forces on the wheels of the wedge sample, ten cells across, are within
+// 2.7 % of those on cells half as wide all the way; with facets that go alone 5.4 %, with one and a half cells 4.6 %.
 constexpr double width_in_cells = 1.0;
 constexpr double width_in_radii = 0.2;
+constexpr double most_radius_in_cells = 16.0;  // beyond that the grid's bends are small, and contact so wide that its tangent is dear
 
 // Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a touch
 // coming; from there on it grows evenly.
@@ -56,6 +57,11 @@ double signed_depth(const Shape& shape, const Vec2& x) {
 
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
     : shape_(shape), body_(body), friction_(friction) {
+    const double cell = body.layout.cell.maxCoeff();
+    if (const auto* circle = std::get_if<Circle>(&shape); circle && circle->radius <= most_radius_in_cells * cell)
+        width_ = std::min(width_in_cells * cell, width_in_radii * circle->radius);
+    goes_on_.resize(body.facets.size(), false);
+    find_joints(0, static_cast<int>(body.facets.size()) - 1);
     find_holds();
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets)
@@ -64,23 +70,37 @@ SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double 
         for (const Facet& f : body.facets) place_.push_back(f.position);
 }
 
-// The mean is over as much both ways as the smooth piece of the outline goes on, so that what is linear along it stays.
+// Whether facets from `first` to `last` go on smoothly. True where that is not what it was.
+bool SlidingBody::find_joints(int first, int last) {
+    constexpr double touching = 1e-3, smooth = 0.9;  // of a facet's length; cosine
+    const Points& points = body_.points;
+    const auto is_torn = [&](int p, int q) {  // a crack is between them where they see two fields of a node
+        const auto nodes_p = body_.layout.cell_nodes(points.cell[p]), nodes_q = body_.layout.cell_nodes(points.cell[q]);
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
+            for (int l = 0; l < body_.layout.nodes_per_cell(); ++l)
+                if (nodes_p[k] == nodes_q[l] && points.node[p][k] != points.node[q][l]) return true;
+        return false;
+    };
+    bool changed = false;
+    for (int i = first; i < last; ++i) {
+        const Facet &a = body_.facets[i], &b = body_.facets[i + 1];
+        const bool goes_on = std::abs((b.position - a.position).norm() - 0.5 * (a.length + b.length)) < touching * a.length &&
+                             a.normal.dot(b.normal) > smooth && (a.point == b.point || !is_torn(a.point, b.point));
+        changed |= std::exchange(goes_on_[i], goes_on) != goes_on;
+    }
+    return changed;
+}
+
+// The mean is over as much both ways as the outline goes on, so that what is linear along it stays.
 void SlidingBody::find_holds() {
     const std::vector<Facet>& facets = body_.facets;
     const int count = static_cast<int>(facets.size());
-    const auto* circle = std::get_if<Circle>(&shape_);
-    const double width = circle ? std::min(width_in_cells * body_.layout.cell.maxCoeff(), width_in_radii * circle->radius) : 0.0;
-    // Whether facet i + 1 goes on where i ends.
-    const auto goes_on = [&](int i) {
-        constexpr double touching = 1e-3, smooth = 0.9;  // of a facet's length; cosine
-        const Facet &a = facets[i], &b = facets[i + 1];
-        return std::abs((b.position - a.position).norm() - 0.5 * (a.length + b.length)) < touching * a.length && a.normal.dot(b.normal) > smooth;
-    };
-    first_hold_.push_back(0);
+    holds_.clear();
+    first_hold_.assign(1, 0);
     for (int i = 0; i < count; ++i) {
-        const int most = static_cast<int>(0.5 * width / facets[i].length);
+        const int most = static_cast<int>(0.5 * width_ / facets[i].length);
         int low = i, high = i;
-        while (high - i < most && low > 0 && high + 1 < count && goes_on(low - 1) && goes_on(high)) {
+        while (high - i < most && low > 0 && high + 1 < count && goes_on_[low - 1] && goes_on_[high]) {
             --low;
             ++high;
         }
@@ -131,13 +151,16 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
     const Vec2 margin = search_margin * body_.layout.cell;
     const Box wide{box.low + moved - margin, box.high + moved + margin};
     const std::vector<int> before = std::exchange(near_, {});
+    bool torn_anew = false;
     const bool some_only = steps_between_searches_ > 1;  // then friction has not followed the others
     for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
         const Vec2 x = current(i, displacement);
         if (!wide.contains(x)) continue;
+        if (width_ > 0.0 && !near_.empty() && near_.back() == i - 1) torn_anew |= find_joints(i - 1, i);
         near_.push_back(i);
         if (friction_ > 0.0 && some_only && !std::binary_search(before.begin(), before.end(), i)) place_[i] = x - moved;
     }
+    if (torn_anew) find_holds();
 }
 
 Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) const {

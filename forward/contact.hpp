@@ -13,8 +13,9 @@ namespace crampfit {
 /// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each facet
 /// that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
 ///
-/// Under a round body a facet goes with the mean of the surface about it, a cell wide: displacements are linear from node to node, and
-/// a wheel that fits itself into each bend at a node is tilted to and fro as it rolls, by 2 degrees with ten cells across.
+/// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of a crack:
+/// displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and fro as it
+/// rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells across.
 class SlidingBody {
   public:
     SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
@@ -45,7 +46,7 @@ class SlidingBody {
         int point;
         std::array<double, most_nodes> weight;
     };
-    std::span<const Hold> holds(int facet) const { return {&holds_[first_hold_[facet]], &holds_[first_hold_[facet + 1]]}; }
+    std::span<const Hold> holds(int facet) const { return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]}; }
 
     double stored_energy() const { return stored_energy_; }  // in the contact's springs at the last push [J]
     double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
@@ -64,11 +65,14 @@ class SlidingBody {
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
     double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
+    bool find_joints(int first, int last);
     void find_holds();
     Vec2 current(int facet, const std::vector<Vec2>& displacement) const;
 
     Shape shape_;
     const Discretisation& body_;
+    double width_ = 0.0;             // with whose mean a facet goes; 0: alone [m]
+    std::vector<char> goes_on_;      // [facets] whether the next one goes on smoothly where this one ends, no crack between them
     std::vector<Hold> holds_;        // by facet
     std::vector<int> first_hold_;    // [facets + 1]
     std::vector<double> stiffness_;  // [facets] [N/m]

@@ -429,10 +429,14 @@ bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::Matrix
         wide_.push_back({first, own});
     }
     const Eigen::LLT<Eigen::MatrixXd> root(yield);
-    if (root.info() != Eigen::Success) return false;
+    const auto failed = [&] {
+        wide_.clear();
+        return false;
+    };
+    if (root.info() != Eigen::Success) return failed();
     const Eigen::MatrixXd across = stiffness * Eigen::MatrixXd(root.matrixL());  // R C
     const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(columns, columns) + root.matrixL().transpose() * across);
-    if (inner.info() != Eigen::Success) return false;
+    if (inner.info() != Eigen::Success) return failed();
     wide_change_ = stiffness - across * inner.solve(across.transpose());
     return true;
 }
