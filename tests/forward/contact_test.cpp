@@ -177,6 +177,22 @@ TEST(VerificationHertz, HalfWidthAndPeak) {
     EXPECT_NEAR(peak, p0, 0.05 * p0);
 }
 
+TEST(UnitContact, AWheelOverAnOpenMouthMeetsNoSurfaceBetweenTheLips) {
+    // The mouth is drawn open to 1 mm; a wheel of 1 mm radius comes down by 0.025 mm, less than 1 - sqrt(1 - 0.5^2) mm.
+    Scene scene = block({10e-3, 10e-3}, 0.25e-3);
+    scene.edges = {moving("left", Side::left, {-1.0, 0.0}), moving("right", Side::right, {1.0, 0.0})};
+    scene.bodies = {sliding("wheel", Circle{Vec2(5e-3, 11e-3), 1e-3}, {0.0, -0.05})};
+    Crack crack;
+    crack.points = {Vec2(5e-3, 10e-3), Vec2(5e-3, 3e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"left", "left"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.stop.time = 0.5e-3;
+    Rest rest(scene);
+    for (int k = 1; k <= 10; ++k) ASSERT_EQ(rest.equilibrium.solve(0.05e-3 * k), Equilibrium::Outcome::solved) << k;
+    EXPECT_LT(rest.push_of(0).norm(), 1e-9 * rest.equilibrium.reactions()[0].norm());
+}
+
 TEST(VerificationPlates, ABlockSpreadsEvenly) {
     // Plane strain between frictionless rigid plates: e_xx = nu / (1 - nu) e, the same everywhere, so that each side goes out by
     // nu W / (2 (1 - nu)) a unit strain, corners too (REFERENCES: .0214286 mm per % at nu = .3, W = 10 mm).
