@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 namespace crampfit {
@@ -211,14 +210,17 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
 // Into the factor.
 bool Equilibrium::take_in_spread() {
     std::vector<int> rows;  // of all, in order
-    for (const Spread& spread : spread_) std::copy_if(spread.rows.begin(), spread.rows.end(), std::back_inserter(rows), [](int row) { return row >= 0; });
+    for (const Spread& spread : spread_)
+        for (const int row : spread.rows)
+            if (row >= 0) rows.push_back(row);
     if (rows.empty()) return true;
     std::sort(rows.begin(), rows.end());
     rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
     Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(rows.size(), rows.size());
     for (const Spread& spread : std::exchange(spread_, {})) {
         std::vector<std::ptrdiff_t> at;
-        for (const int row : spread.rows) at.push_back(row < 0 ? -1 : std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
+        for (const int row : spread.rows)
+            at.push_back(row < 0 ? -1 : std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
         for (std::size_t b = 0; b < at.size(); ++b)
             for (std::size_t a = 0; a < at.size(); ++a)
                 if (at[a] >= 0 && at[b] >= 0) stiffness(at[a], at[b]) += spread.stiffness(a, b);
