@@ -164,6 +164,7 @@ class Quasistatic {
     Missed missed_at(std::size_t number, bool with_slopes);
     MissedEnergy missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes);
     LoadState load_state(const Missed& missed) const;
+    bool parted(std::size_t number) const;
     LoadState nothing(double time) const;
     double time_of(int number) const { return number * time_step_; }
 
@@ -188,6 +189,7 @@ class Quasistatic {
     int last_time_ = 0;                           // number of the last of them
     std::string failure_;
     int equilibria_ = 0;
+    Equilibrium::Outcome outcome_ = Equilibrium::Outcome::solved;  // of the last one
 
     struct Coarse;                                // the second grid
     std::unique_ptr<Coarse> coarse_;
