@@ -54,7 +54,7 @@ void step_wood(benchmark::State& state, bool crack) {
 void wood_without_crack(benchmark::State& state) { step_wood(state, false); }
 void wood_with_crack_and_J(benchmark::State& state) { step_wood(state, true); }
 
-// What the system says of this process's memory, VmRSS or VmHWM, its largest since the mark was wiped [bytes]; Linux only, else 0.
+// What Linux says of this process's memory: VmRSS, or VmHWM, its largest since the mark was wiped [bytes]; 0 elsewhere.
 double memory(const std::string& what) {
     std::ifstream status("/proc/self/status");
     std::string key;
