@@ -3,6 +3,9 @@
 
 #include <benchmark/benchmark.h>
 
+#include <fstream>
+#include <string>
+
 namespace {
 
 using namespace crampfit;
@@ -51,6 +54,17 @@ void step_wood(benchmark::State& state, bool crack) {
 void wood_without_crack(benchmark::State& state) { step_wood(state, false); }
 void wood_with_crack_and_J(benchmark::State& state) { step_wood(state, true); }
 
+// What Linux says of this process's memory: VmRSS, or VmHWM, its largest since the mark was wiped [bytes]; 0 elsewhere.
+double memory(const std::string& what) {
+    std::ifstream status("/proc/self/status");
+    std::string key;
+    for (double kilobytes; status >> key; status.ignore(1000, '\n'))
+        if (key == what + ":" && status >> kilobytes) return 1024.0 * kilobytes;
+    return 0.0;
+}
+
+void wipe_mark() { std::ofstream("/proc/self/clear_refs") << 5; }
+
 // A block of earlywood that one side pulls, in finite rotation: cells a side, threads.
 void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate update) {
     Scene scene = wood(static_cast<int>(state.range(0)), false);
@@ -58,11 +72,15 @@ void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate 
     scene.specimen.material = "EW";
     scene.solver.shape_function = shape;
     scene.solver.velocity_update = update;
+    wipe_mark();
+    const double before = memory("VmRSS");
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
     const Plan plan = make_plan(scene, materials, body);
     ExplicitSolver solver(scene, plan, materials, body, static_cast<int>(state.range(1)));
     for (auto _ : state) solver.step();
+    state.counters["bytes_a_point"] = (memory("VmRSS") - before) / body.points.count();
+    state.counters["most_bytes_a_point"] = (memory("VmHWM") - before) / body.points.count();  // while it was built
     state.SetItemsProcessed(state.iterations() * body.points.count());
     state.counters["points"] = body.points.count();
 }
