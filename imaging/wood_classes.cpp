@@ -1,5 +1,6 @@
 #include "imaging/wood_classes.hpp"
 
+#include "imaging/border_edges.hpp"
 #include "imaging/quantile.hpp"
 
 #include <opencv2/imgproc.hpp>
@@ -22,7 +23,7 @@ constexpr double mixed = 1.5;          // pixels on either side of a border that
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
 cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
     cv::Mat smooth, missing;
-    for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
+    for (const double along : {std::clamp(0.1 * ring_width, 2.0, 6.0), std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
         if (smooth.empty())
             smooth = straight.gray;
@@ -36,19 +37,6 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
-/// The line through some points by least squares, at a place.
-double line_at(double place, const std::vector<cv::Point2d>& points) {
-    cv::Point2d mean;
-    for (const cv::Point2d& point : points)
-        mean += point / static_cast<double>(points.size());
-    double xx = 0, xy = 0;
-    for (const cv::Point2d& point : points) {
-        xx += (point.x - mean.x) * (point.x - mean.x);
-        xy += (point.x - mean.x) * (point.y - mean.y);
-    }
-    return mean.y + xy / xx * (place - mean.x);
-}
-
 /// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
 class RingProfile {
   public:
@@ -60,26 +48,21 @@ class RingProfile {
         sum_[i] += gray;
         ++count_[i];
     }
-    /// The brightest and the darkest of its means over a few steps, or of what these tend to at the borders: EW may darken from its very beginning.
+    /// The brightest and the darkest of its means over a few steps.
     WoodLevels extremes() const {
         const std::size_t n = sum_.size(), reach = n / 40;
-        std::vector<cv::Point2d> means;  // over the place in the ring, in steps
+        WoodLevels levels{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
         for (std::size_t i = 0; i < n; ++i) {
+            if (count_[i] == 0)
+                continue;
             double sum = 0;
             int count = 0;
             for (std::size_t k = i - std::min(i, reach); k <= std::min(n - 1, i + reach); ++k) {
                 sum += sum_[k];
                 count += count_[k];
             }
-            if (count_[i] > 0)
-                means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
-        }
-        const auto [dark, bright] = std::ranges::minmax(means, {}, &cv::Point2d::y);
-        const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
-        WoodLevels levels{bright.y, dark.y};
-        if (means.size() >= 2 * some) {
-            levels.earlywood = std::max(levels.earlywood, line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)}));
-            levels.latewood = std::min(levels.latewood, line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()}));
+            levels.earlywood = std::max(levels.earlywood, sum / count);
+            levels.latewood = std::min(levels.latewood, sum / count);
         }
         return levels;
     }
@@ -92,7 +75,10 @@ class RingProfile {
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
-    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const BorderLine& inner, const BorderLine& outer, int stretch) {
+    /// The ring between border `ring` - 1 and border `ring`.
+    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, const BorderEdges& edges, std::size_t ring,
+               int stretch) {
+        const BorderLine &inner = borders[ring - 1], &outer = borders[ring];
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
@@ -114,7 +100,13 @@ class RingLevels {
             if (grays.size() < least_pixels)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            levels_.push_back(profile->extremes());
+            WoodLevels levels = profile->extremes();
+            // Where EW darkens from its very beginning, or LW to its very end, the blur at the border hides the extreme.
+            if (const auto end_grays = edges.at(ring - 1, (begin + end) / 2))
+                levels.earlywood = std::max(levels.earlywood, end_grays->earlywood);
+            if (const auto end_grays = edges.at(ring, (begin + end) / 2))
+                levels.latewood = std::min(levels.latewood, end_grays->latewood);
+            levels_.push_back(levels);
             ranges_.push_back({quantile(grays, bright_share), quantile(grays, dark_share)});
         }
     }
@@ -232,10 +224,11 @@ cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
 cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
                        const std::vector<BorderLine>& borders, double ring_width, WoodLevels& range) {
     const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
+    const BorderEdges edges(smooth, valid, borders, ring_width);
     std::vector<RingLevels> whole;          // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(40, static_cast<int>(ring_width)));
+        RingLevels ring(smooth, valid, borders, edges, i, std::max(40, static_cast<int>(ring_width)));
         if (!ring.empty()) {
             nearest_whole[i] = static_cast<int>(whole.size());
             whole.push_back(std::move(ring));
