@@ -40,6 +40,15 @@ template <class Function> double least(const std::vector<double>& values, const 
 
 double BorderEdges::Stretch::distance(std::size_t bin) const { return (static_cast<double>(bin) + 0.5) * bin_width - reach; }
 
+void BorderEdges::Stretch::narrow(double to) {
+    const auto cut = static_cast<std::ptrdiff_t>((reach - to) / bin_width);
+    if (cut <= 0)
+        return;
+    reach -= static_cast<double>(cut) * bin_width;
+    sum = {sum.begin() + cut, sum.end() - cut};
+    count = {count.begin() + cut, count.end() - cut};
+}
+
 BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, double ring_width) {
     constexpr double least_reach = 3, share = 0.125;  // pixels; of a ring, over which its gray is as good as a line
     const int length = std::max(40, static_cast<int>(ring_width)), step = std::max(1, length / 50);
@@ -52,8 +61,8 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
             if (!border.covers(begin) || !border.covers(middle) || !border.covers(end - 1))
                 continue;
             const double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle), beside = std::min(before, after);
-            if (!std::isfinite(beside))
-                continue;
+            if (!std::isfinite(beside) || beside < 4 * least_reach)
+                continue;  // rows that tell of a ring's end would be a quarter of it
             const double slope = end - 1 > begin ? (border.at(end - 1) - border.at(begin)) / (end - 1 - begin) : 0;
             const double cosine = 1 / std::sqrt(1 + slope * slope);
             Stretch stretch{0.5 * (begin + end - 1), std::max(least_reach, share * beside * cosine), {}, {}, {}, {}};
@@ -86,9 +95,12 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
         blurs.push_back(blur);
     for (double place = -1; place < 1.01; place += 0.1)
         places.push_back(place);
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < 3; ++round) {
         blur_ = least(blurs, [&](double blur) { return left(blur, place_); });
         place_ = least(places, [&](double place) { return left(blur_, place); });
+        for (auto& border : stretches_)  // what is farther than the blur reaches tells nothing of it, and less of the ring's end
+            for (Stretch& stretch : border)
+                stretch.narrow(std::max(least_reach, 4 * blur_));
     }
     std::vector<float> latewood, earlywood;
     for (const auto& border : stretches_)

@@ -40,6 +40,7 @@ class BorderEdges {
         std::vector<int> count;
 
         double distance(std::size_t bin) const;
+        void narrow(double to);  // its reach, where it is larger [pixels]
     };
     struct Fit {
         double latewood = 0, latewood_slope = 0, earlywood = 0, earlywood_slope = 0;  // l0, l1, e0, e1 [gray, gray per pixel]
