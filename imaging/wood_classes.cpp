@@ -23,7 +23,7 @@ constexpr double mixed = 1.5;          // pixels on either side of a border that
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
 cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
     cv::Mat smooth, missing;
-    for (const double along : {std::clamp(0.1 * ring_width, 2.0, 6.0), std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
+    for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
         if (smooth.empty())
             smooth = straight.gray;

@@ -83,8 +83,9 @@ double cramer_rao(const FinePicture& clean, const PointLattice& lattice, int sub
                 row.tail<2>() << 1, clean.gray[at] - 128;
                 normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
             }
+        const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(2 * terms + 2, 2 * terms + 2);
         const Eigen::MatrixXd covariance =
-            2 * (noise * noise + 1.0 / 12) * normal.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(2 * terms + 2, 2 * terms + 2));
+            2 * (noise * noise + 1.0 / 12) * normal.selfadjointView<Eigen::Lower>().ldlt().solve(identity);
         sum += (covariance(0, 0) + covariance(terms, terms)) / 2;
     }
     return std::sqrt(sum / lattice.count());
@@ -160,8 +161,9 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
                             errors.worst_displacement, errors.sigma, bound);
                 // Interpolation hides a tenth of the noise, and adds some to the slopes.
                 EXPECT_NEAR(errors.sigma / errors.worst_displacement, 1.0, 0.15);
-                if (smoothing == 0)
+                if (smoothing == 0) {
                     EXPECT_NEAR(errors.worst_displacement / bound, 1.0, 0.15);
+                }
             }
         }
 }
