@@ -26,7 +26,8 @@ std::vector<double> slopes_along(const BorderLine& border, const cv::Mat& cos2, 
     return slopes;
 }
 
-/// Angle of a border in each column of the frame: `slopes` and the slope, by a Gaussian window, of what lies between the border and a line of these.
+/// Angle of a border in each column of the frame: `slopes` and the slope, by a Gaussian window, of what lies between the border
+/// and a line of these.
 std::vector<double> angles(const BorderLine& border, const std::vector<double>& slopes, int columns, double sigma) {
     std::vector<double> apart(border.v.size());
     double line = 0;
@@ -82,8 +83,8 @@ struct Traced {
     }
 };
 
-/// Directions at a place: rings between two borders run alike along their normals, and those beyond the outermost as that does, the less the
-/// farther. `covering` are those that cover its column, in order.
+/// Direction at a place: rings between two borders run alike along their normals, and those beyond the outermost as that does,
+/// the less the farther. `covering` are those that cover its column, in order.
 double angle_at(const std::vector<const Traced*>& covering, int u, double v, double before, double ring_width) {
     const auto outer = std::ranges::upper_bound(covering, v, {}, [u](const Traced* one) { return one->border.at(u); });
     double angle = before;
@@ -97,7 +98,8 @@ double angle_at(const std::vector<const Traced*>& covering, int u, double v, dou
         }
         const Traced::Foot below = outer[-1]->foot(u, v, slope), above = (*outer)->foot(u, v, slope);
         const double share = above.v > below.v ? std::clamp((v - below.v) / (above.v - below.v), 0.0, 1.0) : 0.5;
-        const double from = below.met || !above.met ? below.angle : above.angle, to = above.met || !below.met ? above.angle : below.angle;
+        const double from = below.met || !above.met ? below.angle : above.angle;
+        const double to = above.met || !below.met ? above.angle : below.angle;
         angle = from + share * (to - from);
     }
     return angle;

@@ -57,10 +57,12 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
         const BorderLine& border = borders[i];
         const int columns = border.end() - border.first, count = std::max(1, columns / length);
         for (int k = 0; k < count; ++k) {
-            const int begin = border.first + columns * k / count, end = border.first + columns * (k + 1) / count, middle = (begin + end) / 2;
+            const int begin = border.first + columns * k / count, end = border.first + columns * (k + 1) / count;
+            const int middle = (begin + end) / 2;
             if (!border.covers(begin) || !border.covers(middle) || !border.covers(end - 1))
                 continue;
-            const double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle), beside = std::min(before, after);
+            const double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle);
+            const double beside = std::min(before, after);
             if (!std::isfinite(beside) || beside < 4 * least_reach)
                 continue;  // rows that tell of a ring's end would be a quarter of it
             const double slope = end - 1 > begin ? (border.at(end - 1) - border.at(begin)) / (end - 1 - begin) : 0;
@@ -141,7 +143,8 @@ std::optional<BorderGrays> BorderEdges::at(std::size_t border, int column) const
     const std::vector<Stretch>& all = stretches_[border];
     if (all.empty())
         return std::nullopt;
-    const Stretch& nearest = *std::ranges::min_element(all, {}, [column](const Stretch& one) { return std::abs(one.column - column); });
+    const auto away = [column](const Stretch& one) { return std::abs(one.column - column); };
+    const Stretch& nearest = *std::ranges::min_element(all, {}, away);
     if (blur_ > 0.5 * nearest.reach)
         return std::nullopt;  // what looks like this is no jump
     return ends(nearest);

@@ -7,7 +7,7 @@
 
 namespace crampfit {
 
-/// Gray at a ring border as it would be without the picture's blur: the end of one ring's LW and the beginning of the next one's EW.
+/// Gray at a ring border as it would be without the picture's blur: where one ring's LW ends and the next one's EW begins.
 struct BorderGrays {
     double latewood = 0, earlywood = 0;
 };
@@ -16,9 +16,10 @@ struct BorderGrays {
 /// blurred the picture is: gray at a signed distance d from it, towards the bark, is taken as the blur (a Gaussian) of a jump
 /// between two lines,
 ///     (l0 + l1 d) Phi(-d / s) - l1 s phi(d / s) + (e0 + e1 d) Phi(d / s) + e1 s phi(d / s),
-/// Phi being the normal distribution and phi its density. l0, l1, e0 and e1 are fitted to each stretch of a border by least squares, the blur s
-/// and the jump's place against the border's line to all stretches together. The rows beside a border tell slopes badly, under noise, and what
-/// these are off by, l0 and e0 are off, too; so all rings of a picture then have the same slopes as shares of their width, the medians.
+/// Phi being the normal distribution and phi its density. l0, l1, e0 and e1 are fitted to each stretch of a border by least
+/// squares, the blur s and the jump's place against the border's line to all stretches together. Under noise the rows beside a
+/// border tell slopes badly, and what these are off by, l0 and e0 are off, too; so all rings of a picture then have the same
+/// slopes, as shares of their width: the medians.
 class BorderEdges {
   public:
     /// `gray` and `valid` (0 or 1, float) in the growth frame; a stretch is `ring_width` [pixels] long, 40 at least.

@@ -37,6 +37,19 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
+/// The line through some points by least squares, at a place.
+double line_at(double place, const std::vector<cv::Point2d>& points) {
+    cv::Point2d mean;
+    for (const cv::Point2d& point : points)
+        mean += point / static_cast<double>(points.size());
+    double xx = 0, xy = 0;
+    for (const cv::Point2d& point : points) {
+        xx += (point.x - mean.x) * (point.x - mean.x);
+        xy += (point.x - mean.x) * (point.y - mean.y);
+    }
+    return mean.y + xy / xx * (place - mean.x);
+}
+
 /// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
 class RingProfile {
   public:
@@ -48,21 +61,29 @@ class RingProfile {
         sum_[i] += gray;
         ++count_[i];
     }
-    /// The brightest and the darkest of its means over a few steps.
-    WoodLevels extremes() const {
+    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very beginning. Where an end
+    /// is not known it is what the means tend to there.
+    WoodLevels extremes(const std::optional<BorderGrays>& inner, const std::optional<BorderGrays>& outer) const {
         const std::size_t n = sum_.size(), reach = n / 40;
-        WoodLevels levels{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+        std::vector<cv::Point2d> means;  // over the place in the ring, in steps
         for (std::size_t i = 0; i < n; ++i) {
-            if (count_[i] == 0)
-                continue;
             double sum = 0;
             int count = 0;
             for (std::size_t k = i - std::min(i, reach); k <= std::min(n - 1, i + reach); ++k) {
                 sum += sum_[k];
                 count += count_[k];
             }
-            levels.earlywood = std::max(levels.earlywood, sum / count);
-            levels.latewood = std::min(levels.latewood, sum / count);
+            if (count_[i] > 0)
+                means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
+        }
+        const auto [dark, bright] = std::ranges::minmax(means, {}, &cv::Point2d::y);
+        const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
+        WoodLevels levels{bright.y, dark.y};
+        if (means.size() >= 2 * some) {
+            const double begin = line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)});
+            const double end = line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()});
+            levels.earlywood = std::max(levels.earlywood, inner ? inner->earlywood : begin);
+            levels.latewood = std::min(levels.latewood, outer ? outer->latewood : end);
         }
         return levels;
     }
@@ -100,13 +121,8 @@ class RingLevels {
             if (grays.size() < least_pixels)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            WoodLevels levels = profile->extremes();
-            // Where EW darkens from its very beginning, or LW to its very end, the blur at the border hides the extreme.
-            if (const auto end_grays = edges.at(ring - 1, (begin + end) / 2))
-                levels.earlywood = std::max(levels.earlywood, end_grays->earlywood);
-            if (const auto end_grays = edges.at(ring, (begin + end) / 2))
-                levels.latewood = std::min(levels.latewood, end_grays->latewood);
-            levels_.push_back(levels);
+            const int middle = (begin + end) / 2;
+            levels_.push_back(profile->extremes(edges.at(ring - 1, middle), edges.at(ring, middle)));
             ranges_.push_back({quantile(grays, bright_share), quantile(grays, dark_share)});
         }
     }
