@@ -135,11 +135,11 @@ TEST(VerificationCorrelate, QuadraticFieldsUpToFivePercent) {
     expect_within_bars("quadratic", bent(0.05), 2, 1.0);
 }
 
-// The standard error that a point tells of itself is that of the displacements' scatter, for white noise; and no unbiased estimate from the
-// same subsets scatters less than the bound of Cramer and Rao, of which coarse features alone (`smoothing`) give up a part. Where gray varies
-// alike in all of the subset, the parabola's terms of a second-order warp take 5 / 4 along x and 5 / 4 along y of what a first-order warp
-// knows of the middle, so that its bound is sqrt(3.5) = 1.87 times as high: 0.01 px then needs a noise of 2 of 255 where the first order
-// bears 4.
+// The standard error that a point tells of itself is that of the displacements' scatter, for white noise; and no unbiased
+// estimate from the same subsets scatters less than the bound of Cramer and Rao, which is met without smoothing and passed by
+// half with it: coarse features alone tell less. Where gray varies alike in all of the subset, the parabola's terms of a
+// second-order warp take 5 / 4 along x and 5 / 4 along y of what a first-order warp knows of the middle, so that its bound is
+// sqrt(3.5) = 1.87 times as high.
 TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
     for (const int order : {1, 2})
         for (const double noise : {1.0, 3.0}) {

@@ -134,7 +134,7 @@ TEST(VerificationSegment, DirectionsFromAFittedPith) {
         std::printf("pith at %g,%g px: directions off by %.2f degrees on average, of the fitted pith by %.2f\n", pith.x(), pith.y(), own, fitted);
         EXPECT_LT(fitted, 1);
         EXPECT_LT(fitted, own);
-        EXPECT_LT(error_of({.pith = pith}), 1e-3);
+        EXPECT_LT(error_of({.pith = pith}), 0.05);  // between nodes a direction is off by about the square of their spacing over the pith's distance
     }
 }
 
