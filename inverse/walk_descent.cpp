@@ -250,8 +250,8 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
         nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
         objective.runs().size());
     if (unconfirmed > 0) {
-        result.method += fmt::format(" It ended where runs did not confirm what those nearby promised, {:.2g} of the misfit: so well is it "
-                                     "known.", unconfirmed);
+        result.method += fmt::format(" It ended where runs did not confirm what those nearby promised, {:.2g} of the misfit: so "
+                                     "well is it known.", unconfirmed);
     }
     return result;
 }
