@@ -25,12 +25,25 @@ Scene scene_in(const Scene& whole, const Box& box, double cell) {
     return scene;
 }
 
+// The part of a crack that a place in a box can be nearest to: the crack runs through it.
+std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
+    const Vec2 reach = Vec2::Constant((box.high - box.low).norm());
+    const Box about{box.low - reach, box.high + reach};
+    const auto counts = [&](std::size_t k) { return about.touches({points[k].cwiseMin(points[k + 1]), points[k].cwiseMax(points[k + 1])}); };
+    std::size_t first = 0, last = points.size() - 2;
+    while (first < last && !counts(first)) ++first;
+    while (last > first && !counts(last)) --last;
+    return {points.begin() + static_cast<std::ptrdiff_t>(first), points.begin() + static_cast<std::ptrdiff_t>(last) + 2};
+}
+
 } // namespace
 
 int GridView::point_beside(const Vec2& x) const {
-    int nearest = -1;
-    double least = INFINITY;
     const bool left = cracks.is_left(crack, x);
+    int nearest = body.point_at(x);
+    if (nearest >= 0 && cracks.is_left(crack, body.points.position[nearest]) == left) return nearest;  // most often
+    nearest = -1;
+    double least = INFINITY;
     body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
             const double distance = (body.points.position[p] - x).squaredNorm();
@@ -92,7 +105,7 @@ bool CutOut::solve(const CrackLine& line, int crack, bool at_end, const GridView
         for (const Vec2& to : *way) equilibrium_->grow(0, at_end, to - wood_->box.low);
     } else {
         scene_.cracks = {whole_.cracks[crack]};
-        scene_.cracks[0].points = line.points;
+        scene_.cracks[0].points = part_about(line.points, wood_->box);
         for (Vec2& x : scene_.cracks[0].points) x -= wood_->box.low;
         cracked_ = wood_->body;
         equilibrium_.emplace(scene_, plan_, wood_->materials, cracked_);
@@ -122,7 +135,8 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
             if (!unknown[field]) continue;
             unknown[field] = false;  // once is enough
             // As the wood beside the node moves, on its side of the crack.
-            const int other = from.point_beside(cracked_.points.position[p] + shift);
+            const Vec2 place = cracked_.points.position[p] + shift;
+            const int other = solved_there ? from.body.point_at(place) : from.point_beside(place);
             if (other < 0) return false;
             const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
             Hold hold{field, {}, from.body.values_at(from.body.points.cell[other], x)};
