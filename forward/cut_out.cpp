@@ -29,7 +29,9 @@ Scene scene_in(const Scene& whole, const Box& box, double cell) {
 std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
     const Vec2 reach = Vec2::Constant((box.high - box.low).norm());
     const Box about{box.low - reach, box.high + reach};
-    const auto counts = [&](std::size_t k) { return about.touches({points[k].cwiseMin(points[k + 1]), points[k].cwiseMax(points[k + 1])}); };
+    const auto counts = [&](std::size_t k) {
+        return about.touches({points[k].cwiseMin(points[k + 1]), points[k].cwiseMax(points[k + 1])});
+    };
     std::size_t first = 0, last = points.size() - 2;
     while (first < last && !counts(first)) ++first;
     while (last > first && !counts(last)) --last;
@@ -86,7 +88,9 @@ CutOut::CutOut(const Scene& whole, const Plan& plan, const std::vector<MaterialS
 std::optional<std::vector<Vec2>> CutOut::way_to(const CrackLine& line, int crack, bool at_end) const {
     const std::size_t known = points_.size();
     if (crack_ != crack || line.points.size() < known) return std::nullopt;
-    const auto nth = [&](const std::vector<Vec2>& points, std::size_t k) { return at_end ? points[k] : points[points.size() - 1 - k]; };
+    const auto nth = [&](const std::vector<Vec2>& points, std::size_t k) {
+        return at_end ? points[k] : points[points.size() - 1 - k];
+    };
     for (std::size_t k = 0; k + 1 < known; ++k)
         if (nth(points_, k) != nth(line.points, k)) return std::nullopt;
     // A crack that goes straight on has its last point moved.

@@ -24,7 +24,9 @@ struct GridView {
 struct CutOutWood {
     CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell);
 
-    bool is(const Box& place, double width) const { return place.low == box.low && place.high == box.high && width == scene.model.cell; }
+    bool is(const Box& place, double width) const {
+        return place.low == box.low && place.high == box.high && width == scene.model.cell;
+    }
     const std::vector<MaterialSlope>& slopes_by(const std::vector<MaterialSlope>& numbers);
 
     Box box;                               // in the specimen

@@ -65,7 +65,8 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
 bool Quasistatic::goes_with_load(const std::vector<Vec2>& drivers) const {
     const Boundary& boundary = equilibrium_.boundary();
     bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium_.time() > 0.0;
-    for (int d = 0; d < boundary.drivers() && goes; ++d) goes = boundary.travel(d, equilibrium_.time()) == equilibrium_.time() * drivers[d];
+    const double time = equilibrium_.time();
+    for (int d = 0; d < boundary.drivers() && goes; ++d) goes = boundary.travel(d, time) == time * drivers[d];
     return goes;
 }
 
