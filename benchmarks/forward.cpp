@@ -1,5 +1,7 @@
-// Speed of the forward solver. `items_per_second` is material-point steps a second on one core.
+// Speed of the forward solver. Of explicit dynamics `items_per_second` is material-point steps a second on one core; at
+// equilibrium the time is that of a whole run.
 #include "forward/explicit.hpp"
+#include "forward/kept_walk.hpp"
 
 #include <benchmark/benchmark.h>
 
@@ -85,6 +87,27 @@ void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate 
     state.counters["points"] = body.points.count();
 }
 
+// At equilibrium a crack runs across the whole specimen: cells a side, threads, and by how many numbers of the woods derivatives
+// are asked for (those by toughness come from the same walk).
+void crack_across_wood(benchmark::State& state) {
+    Scene scene = wood(static_cast<int>(state.range(0)), true);
+    scene.edges[0].velocity = {0.0, 1e-3 / 60.0};
+    scene.cracks[0].advance = 0.2e-3;
+    scene.stop.displacement.reset();
+    scene.stop.crack_length = 10e-3;
+    const std::vector<std::string> moduli{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu"};
+    const std::vector<std::string> numbers(moduli.begin(), moduli.begin() + state.range(2));
+    for (auto _ : state) {
+        const Record record = KeptWalk(scene, numbers, static_cast<int>(state.range(1))).run(scene, {});
+        state.counters["points"] = static_cast<double>(record.points);
+        state.counters["equilibria"] = static_cast<double>(record.steps);
+        const bool ended = record.status == RunStatus::split || record.status == RunStatus::finished;
+        if (!ended) state.SkipWithError(record.message.c_str());
+    }
+}
+
+BENCHMARK(crack_across_wood)->Args({92, 1, 0})->Args({92, 1, 4})->Args({368, 2, 0})->Iterations(1)->Unit(benchmark::kSecond)
+    ->MeasureProcessCPUTime();
 BENCHMARK_CAPTURE(elastic_block, gimp, ShapeFunction::gimp, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, splines, ShapeFunction::bspline2, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, flip, ShapeFunction::gimp, VelocityUpdate::flip)->Args({500, 1})->UseRealTime();

@@ -154,6 +154,7 @@ class Quasistatic {
     void keep_slopes(std::size_t number, int time, Slopes slopes);
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
+    bool goes_with_load(const std::vector<Vec2>& drivers) const;
     std::optional<Slopes> slopes_here(const Missed& missed);
     void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
                     std::vector<LoadState>& slopes) const;
