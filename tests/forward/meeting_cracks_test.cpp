@@ -126,11 +126,7 @@ TEST(HardMeeting, CrossesThatCutAPlateInFourCarryNothing) {
 
 TEST(HardMeeting, APlateCutInTwoBeforehandCarriesPressureAlone) {
     Scene whole = square({}), cut = square({line({-1, 9.8}, {21, 9.8})});
-    for (const bool slides : {false, true}) {
-        if (slides) cut.edges[0].velocity[0].reset();
-        hard_case(fmt::format("plate cut in two, drawn apart, upper half {}", slides ? "free to slide" : "held"), "nothing is carried",
-                  simulate(cut).series.back().force, 1e-9);
-    }
+    hard_case("plate cut in two, drawn apart", "nothing is carried", simulate(cut).series.back().force, 1e-9);
     for (Scene* scene : {&whole, &cut}) scene->edges[0] = moving("top", Side::top, {0.0, -mm_per_minute});
     const Record pressed = simulate(cut);
     EXPECT_EQ(pressed.status, RunStatus::finished) << pressed.message;
