@@ -12,12 +12,12 @@ namespace crampfit::reference {
 /// A scene whose answer is known, on any grid.
 struct Problem {
     std::string name;
-    std::string quantity;          // what is compared
-    std::string source;            // of the exact value
-    double known_to;               // what the exact value itself is good to, relative
-    std::string counted;           // what the grid is counted by: cells per ...
-    std::vector<double> cells;     // grids, coarse to fine
-    double slowest;                // angular frequency of its slowest vibration, roughly [rad/s]; 0: equilibrium alone
+    std::string quantity;       // what is compared
+    std::string source;         // of the exact value
+    double known_to;            // what the exact value itself is good to, relative
+    std::string counted;        // what the grid is counted by: cells per ...
+    std::vector<double> cells;  // grids, coarse to fine
+    double slowest;             // angular frequency of its slowest vibration, roughly [rad/s]; 0: equilibrium alone
     std::function<Scene(double cells, int points_per_cell)> scene;  // at equilibrium, its load complete after a second
     std::function<double(const Record&)> ratio;                     // what comes out over what is exact
 };
@@ -38,4 +38,4 @@ double double_cantilever_G();
 /// followed until what moves has died out to 1e-4.
 Scene in_damped_motion(Scene scene, double slowest);
 
-} // namespace crampfit::reference
+}  // namespace crampfit::reference

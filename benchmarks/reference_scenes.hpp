@@ -107,11 +107,11 @@ void load_sides(Scene& scene, Stress stress) {
 }
 
 struct SlantedCrack {
-    double cells = 10.0;             // per half crack
-    double angle = 0.0;              // of the crack against the grid [rad]
-    Mat2 remote = Mat2::Zero();      // stress far away [Pa]
-    Vec2 offset = Vec2::Zero();      // of the crack's centre from a node, in cells
-    double half_length = 10e-3;      // a [m]
+    double cells = 10.0;         // per half crack
+    double angle = 0.0;          // of the crack against the grid [rad]
+    Mat2 remote = Mat2::Zero();  // stress far away [Pa]
+    Vec2 offset = Vec2::Zero();  // of the crack's centre from a node, in cells
+    double half_length = 10e-3;  // a [m]
     int points_per_cell = 4;
 };
 
@@ -139,4 +139,4 @@ Scene slanted_crack(const SlantedCrack& c, const Exact& exact = griffith_stress)
     return scene;
 }
 
-} // namespace crampfit::reference
+}  // namespace crampfit::reference

@@ -63,9 +63,9 @@ class BridgedFaces {
 
     const Scene& scene_;
     const Discretisation& body_;
-    double most_frequency_squared_;   // [1/s^2]
-    std::vector<Bridge> bridges_;     // [pairs]
-    std::vector<std::size_t> live_;   // of them those that have faces
+    double most_frequency_squared_;  // [1/s^2]
+    std::vector<Bridge> bridges_;    // [pairs]
+    std::vector<std::size_t> live_;  // of them those that have faces
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -21,12 +21,14 @@ constexpr double stiffness_in_cells = 10.0;
 // cells 4.6 %. Chosen by that, as is where the mean ends.
 constexpr double width_in_cells = 1.0;
 constexpr double width_in_radii = 0.2;
-constexpr double most_radius_in_cells = 16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
+constexpr double most_radius_in_cells =
+    16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
 
 // Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a touch
 // coming; from there on it grows evenly.
 constexpr double onset_in_cells = 0.0003;
-constexpr double at_touch = 0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
+constexpr double at_touch =
+    0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
 
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
@@ -54,7 +56,7 @@ double signed_depth(const Shape& shape, const Vec2& x) {
     return inside(shape, x) ? distance : -distance;
 }
 
-} // namespace
+}  // namespace
 
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
     : shape_(shape), body_(body), friction_(friction) {
@@ -167,7 +169,8 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
 }
 
 Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) const {
-    const auto kept = std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
+    const auto kept =
+        std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
     const bool is_kept = kept != grips_.end() && kept->place == touch.facet;
     const Vec2& before = place_[touch.facet];
     const double depth_before = is_kept ? 0.0 : std::min(0.0, signed_depth(shape_, before));
@@ -202,10 +205,12 @@ void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacemen
     for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
     const auto keep = [&](int i) { place_[i] = current(i, displacement) - moved; };
     if (steps_between_searches_ > 1) std::for_each(near_.begin(), near_.end(), keep);
-    else for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
+    else
+        for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
 }
 
-void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement) {
+void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved,
+                          const std::vector<Vec2>& displacement) {
     if (friction_ == 0.0) return;
     grips_ = grips;
     dissipated_ = dissipated;
@@ -269,4 +274,4 @@ Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement,
     return total;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -46,9 +46,11 @@ class SlidingBody {
         int point;
         std::array<double, most_nodes> weight;
     };
-    std::span<const Hold> holds(int facet) const { return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]}; }
+    std::span<const Hold> holds(int facet) const {
+        return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]};
+    }
 
-    double stored_energy() const { return stored_energy_; }  // in the contact's springs at the last push [J]
+    double stored_energy() const { return stored_energy_; }           // in the contact's springs at the last push [J]
     double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
 
     /// Keeps the last push as what friction counts from.
@@ -82,12 +84,12 @@ class SlidingBody {
     double stored_energy_ = 0.0;
 
     // Friction:
-    double friction_;                // coefficient; 0: none, and nothing below is there
-    std::vector<Vec2> place_;        // [facets] against the body when it was kept [m]
-    std::vector<Grip> grips_;        // of the facets that touched then, by facet
-    std::vector<Touch> pushed_;      // the last push
-    double dissipated_ = 0.0;        // until then [J]
-    double sliding_now_ = 0.0;       // by the last push since then [J]
+    double friction_;            // coefficient; 0: none, and nothing below is there
+    std::vector<Vec2> place_;    // [facets] against the body when it was kept [m]
+    std::vector<Grip> grips_;    // of the facets that touched then, by facet
+    std::vector<Touch> pushed_;  // the last push
+    double dissipated_ = 0.0;    // until then [J]
+    double sliding_now_ = 0.0;   // by the last push since then [J]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

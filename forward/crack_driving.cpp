@@ -62,7 +62,7 @@ double cubic(double from, double slope_from, double to, double slope_to, double 
     return from * (1.0 + 2.0 * s) * r * r + slope_from * s * r * r + to * s * s * (3.0 - 2.0 * s) - slope_to * s * s * r;
 }
 
-} // namespace
+}  // namespace
 
 LoadState scaled(const LoadState& state, double factor) {
     LoadState at = state;
@@ -195,7 +195,8 @@ double Station::critical_time(double toughness, bool beyond) const {
         const double ratio = (excess[other] + needed) / released;
         double power = 2.0;
         if (finite_advance) power = slope[start] * time[start] / released;
-        else if (ratio > 0.0 && time[other] > 0.0 && other != start) power = std::log(ratio) / std::log(time[other] / time[start]);
+        else if (ratio > 0.0 && time[other] > 0.0 && other != start)
+            power = std::log(ratio) / std::log(time[other] / time[start]);
         return time[start] * std::pow(needed / released, 1.0 / std::max(power, 0.5));
     };
     if (beyond && excess.back() < 0.0) {
@@ -235,4 +236,4 @@ double Station::critical_time(double toughness, bool beyond) const {
     return found <= still_from * (1.0 + 1e-12) ? found : never;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -56,7 +56,7 @@ bool lies_beyond(double distance, const Vec2& from, const Vec2& to, const Vec2& 
     return (from.cwiseMin(to) - x).maxCoeff() > distance || (x - from.cwiseMax(to)).maxCoeff() > distance;
 }
 
-} // namespace
+}  // namespace
 
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) {
     // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
@@ -114,10 +114,10 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
         CrackLine line;
         line.points = crack.points;
         const std::size_t last = crack.points.size() - 1;
-        line.start = {crack.grows == Growth::start || crack.grows == Growth::both, is_inside(crack.points[0]),
-                      crack.points[0], (crack.points[0] - crack.points[1]).normalized()};
-        line.end = {crack.grows == Growth::end || crack.grows == Growth::both, is_inside(crack.points[last]),
-                    crack.points[last], (crack.points[last] - crack.points[last - 1]).normalized()};
+        line.start = {crack.grows == Growth::start || crack.grows == Growth::both, is_inside(crack.points[0]), crack.points[0],
+                      (crack.points[0] - crack.points[1]).normalized()};
+        line.end = {crack.grows == Growth::end || crack.grows == Growth::both, is_inside(crack.points[last]), crack.points[last],
+                    (crack.points[last] - crack.points[last - 1]).normalized()};
         line.length = length_inside(line.points, {Vec2::Zero(), body.layout.size()});
         lines.push_back(line);
     }
@@ -154,7 +154,8 @@ bool CrackFields::is_left(int crack, const Vec2& x) const {
     const double rounding = 1e-9 * body_->layout.cell.minCoeff();  // a node on the crack counts as left of it
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
-    const double reach = std::sqrt(std::min((x - points.front()).squaredNorm(), (x - points.back()).squaredNorm())) + 2.0 * rounding;
+    const double reach =
+        std::sqrt(std::min((x - points.front()).squaredNorm(), (x - points.back()).squaredNorm())) + 2.0 * rounding;
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
         const bool at_an_end = k == 0 || k + 2 == points.size();
         if (!at_an_end && lies_beyond(reach, points[k], points[k + 1], x)) continue;
@@ -427,4 +428,4 @@ Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& dis
     return jump;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

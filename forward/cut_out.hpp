@@ -29,13 +29,13 @@ struct CutOutWood {
     }
     const std::vector<MaterialSlope>& slopes_by(const std::vector<MaterialSlope>& numbers);
 
-    Box box;                               // in the specimen
-    Scene scene;                           // of what is cut out; its outline is held where the specimen goes on
+    Box box;      // in the specimen
+    Scene scene;  // of what is cut out; its outline is held where the specimen goes on
     MaterialMap materials;
     Discretisation body;
 
   private:
-    std::vector<MaterialSlope> slopes_;    // of the numbers here; empty: not asked for yet
+    std::vector<MaterialSlope> slopes_;  // of the numbers here; empty: not asked for yet
 };
 
 /// A box cut out of the specimen with one of its cracks; its outline is held where another grid has it. A crack that goes on takes along
@@ -74,13 +74,13 @@ class CutOut {
     const Plan& plan_;
     const std::vector<MaterialSlope>& numbers_;
     std::shared_ptr<CutOutWood> wood_;
-    Scene scene_;                          // with the crack
+    Scene scene_;  // with the crack
     Discretisation cracked_;
     std::optional<Equilibrium> equilibrium_;
-    int crack_ = -1;                       // that it holds, by its number in the specimen; -1: none yet
-    std::vector<Vec2> points_;             // of that crack, in the specimen [m]
-    std::vector<Hold> taken_;              // the outline, or all that is solved there
+    int crack_ = -1;            // that it holds, by its number in the specimen; -1: none yet
+    std::vector<Vec2> points_;  // of that crack, in the specimen [m]
+    std::vector<Hold> taken_;   // the outline, or all that is solved there
     bool solved_there_ = false;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

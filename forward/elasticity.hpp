@@ -59,4 +59,4 @@ LayeredElasticity layered(const Eigen::Matrix3d& stiffness, const Vec2& normal);
 /// wood whose axes are x and y (Vinh and Ogden 2004, eq. 1); where they are not, the coupling of stretch and shear is left out.
 double rayleigh_speed(const Eigen::Matrix3d& stiffness, double density);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -12,15 +12,15 @@ struct NodalState {
     const std::vector<Vec2>& displacement;  // [m]
     const std::vector<Vec2>& velocity;      // [m/s]
     const std::vector<Vec2>& acceleration;  // [m/s^2]
-    std::span<const Vec2> faces = {};       // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
+    std::span<const Vec2> faces = {};  // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
 };
 
 struct TipLoad {
-    double G = 0;             // energy release rate [J/m^2]
-    double K_I = 0;           // [Pa sqrt(m)]
-    double K_II = 0;          // [Pa sqrt(m)]
+    double G = 0;                 // energy release rate [J/m^2]
+    double K_I = 0;               // [Pa sqrt(m)]
+    double K_II = 0;              // [Pa sqrt(m)]
     Vec2 opening = Vec2::Zero();  // displacement jump just behind the tip, the left face less the right [m]
-    double toughness = 0;     // of the wood at the tip [J/m^2]
+    double toughness = 0;         // of the wood at the tip [J/m^2]
 };
 
 /// Displacement jump just behind a tip, the left face less the right [m].
@@ -32,8 +32,8 @@ struct EnergyReleaseOptions {
     double inner = 2.0;        // the part that moves rigidly with the tip
     double outer = 4.5;        // beyond it nothing moves
     double margin = 1.0;       // and wood that changes so near beyond that makes J uncertain still
-    double least_inner = 1.0;        // holds the tied pair at the tip
-    double least_outer = 3.0;        // in other wood
+    double least_inner = 1.0;  // holds the tied pair at the tip
+    double least_outer = 3.0;  // in other wood
     double least_outer_at_cracks = 2.0;
     bool rotates = false;
 };
@@ -51,4 +51,4 @@ struct EnergyReleaseOptions {
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 
-} // namespace crampfit
+}  // namespace crampfit

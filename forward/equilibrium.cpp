@@ -44,14 +44,13 @@ constexpr int most_trials = 12;  // of a part of a Newton step
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
 constexpr double least_strain = 1e-5;
 
-} // namespace
+}  // namespace
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
-      internal_force_(body, materials, plan.rotates, history_.get()),
-      factor_(body.layout.cells_x, body.layout.cells_y, threads) {
+      internal_force_(body, materials, plan.rotates, history_.get()), factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
@@ -205,16 +204,17 @@ void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::
 // Points of a cell that follow each other on the same fields go together.
 template <class Visit>
 void Equilibrium::for_groups_of(int c, const Visit& visit) const {
-    for_groups(body_.points, c, [&](const PointGroup& group) {
-        visit(std::as_const(body_.points).node[group.first], group.first, group.count);
-    });
+    for_groups(body_.points, c,
+               [&](const PointGroup& group) { visit(std::as_const(body_.points).node[group.first], group.first, group.count); });
 }
 
 // The same of the points.
 void Equilibrium::couple_points(bool geometric) {
-    if (free_.empty() && std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; })) return;
+    if (free_.empty() && std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; }))
+        return;
     const auto goes = [&](int f) {
-        return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 || free_of_dof_[2 * f + 1] >= 0;
+        return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 ||
+               free_of_dof_[2 * f + 1] >= 0;
     };
     for (int c = 0; c < body_.layout.cells(); ++c)
         for_groups_of(c, [&](std::span<const int> fields, int first, int count) {
@@ -251,7 +251,8 @@ void Equilibrium::add_lone_points() {
         const auto& sign = crosswise_sign;
         Eigen::Matrix<double, 8, 8> tangent;
         for (int a = 0; a < 4; ++a)
-            for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
+            for (int b = 0; b < 4; ++b)
+                tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
         add_extra(body_.points.cell[alone.point], body_.points.node[alone.point], tangent);
     }
 }
@@ -332,7 +333,8 @@ void Equilibrium::move_prescribed() {
 double Equilibrium::slope_along(const Eigen::VectorXd& step) const { return -out_of_balance().dot(step); }
 
 void Equilibrium::move(const Eigen::VectorXd& step, double share) {
-    for (std::size_t k = 0; k < free_.size(); ++k) moved_[free_[k].driver][free_[k].axis] += share * step[equations_ + static_cast<int>(k)];
+    for (std::size_t k = 0; k < free_.size(); ++k)
+        moved_[free_[k].driver][free_[k].axis] += share * step[equations_ + static_cast<int>(k)];
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (const int row = row_of(static_cast<int>(dof)); row >= 0) displacement_[dof / 2][dof % 2] += share * step[row];
 }
@@ -385,7 +387,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     bool renew = true;
     double slack = plan_.grows ? slack_of_tangent : 0.0;
     // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-    const auto factor = [&] { return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0); };
+    const auto factor = [&] {
+        return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0);
+    };
     find_forces();
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
@@ -401,7 +405,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (plan_.linear) load = (load.array().abs() > rounding * load.lpNorm<Eigen::Infinity>()).select(load, 0.0);
         const Eigen::VectorXd step = newton_step(std::move(load));
         step_load_.setZero();
-        const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
+        const bool moves_boundary =
+            time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
         if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
             move_prescribed();
             move(step, 1.0);
@@ -419,8 +424,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             return Outcome::solved;
         }
         if (iteration >= quick_iterations) slack = 0.0;
-        renew = plan_.friction ? residual > worth_keeping_with_friction * before
-              : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
+        renew = plan_.friction
+                    ? residual > worth_keeping_with_friction * before
+                    : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
 }
@@ -439,14 +445,15 @@ double Equilibrium::strain_energy() const {
 double Equilibrium::traction_work() const {
     double work = 0.0;
     for (const Boundary::Traction& t : boundary_.tractions)
-        for (int k = 0; k < 4; ++k)
-            work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+        for (int k = 0; k < 4; ++k) work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
     for (const Free& free : free_) work += free.force * moved_[free.driver][free.axis];
     return work;
 }
 
 double Equilibrium::potential() const {
-    if (!potential_) potential_ = strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+    if (!potential_)
+        potential_ =
+            strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
     return *potential_;
 }
 
@@ -484,7 +491,9 @@ void Equilibrium::mark_moved_points(const PointTable<int>& before) {
     }
 }
 
-Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()}; }
+Equilibrium::Snapshot Equilibrium::save() const {
+    return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()};
+}
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
@@ -518,4 +527,4 @@ bool Equilibrium::relax(const std::vector<Vec2>& displacement) {
     return true;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -20,7 +20,7 @@ constexpr int bisections = 50;
 // Motions of free bodies that meet less stiffness than this part of the largest meet none: no force goes with them.
 constexpr double no_stiffness = 1e-9;
 
-} // namespace
+}  // namespace
 
 void Equilibrium::find_free_bodies() {
     moved_.assign(boundary_.drivers(), Vec2::Zero());
@@ -55,7 +55,8 @@ void Equilibrium::seat(int sliding) {
         high += step;
         if (high > farthest.norm())
             throw InputError(scene_.file.string(), "bodies." + rigid.name + ".force",
-                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()), "the body meets nothing on this way that could carry the force");
+                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()),
+                             "the body meets nothing on this way that could carry the force");
     }
     double low = std::max(0.0, high - step);
     for (int k = 0; k < bisections; ++k) (carries(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
@@ -87,7 +88,8 @@ bool Equilibrium::border_tangent() {
     factor_.solve(free_motion_);
     const Eigen::MatrixXd schur = free_stiffness_ - free_load_.transpose() * free_motion_;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (schur + schur.transpose()));
-    const double none = no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
+    const double none =
+        no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
     Eigen::VectorXd yields = Eigen::VectorXd::Zero(schur.rows());
     for (int k = 0; k < yields.size(); ++k) {
         if (modes.eigenvalues()[k] < -none) return false;
@@ -130,8 +132,9 @@ Eigen::VectorXd Equilibrium::remainder_of(const Eigen::VectorXd& step) const {
 
 Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
     if (rubbing_.empty()) return bordered_step(right);
-    return solve_with_remainder(right, [&](const Eigen::VectorXd& x) { return bordered_step(x); },
-                                [&](const Eigen::VectorXd& x) { return remainder_of(x); });
+    return solve_with_remainder(
+        right, [&](const Eigen::VectorXd& x) { return bordered_step(x); },
+        [&](const Eigen::VectorXd& x) { return remainder_of(x); });
 }
 
 void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder) {
@@ -144,7 +147,8 @@ void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const doubl
     const Vec2 force = remainder * apart;
     for (int axis = 0; axis < 2; ++axis) {
         for (std::size_t a = 0; a < fields.size(); ++a)
-            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0) step_load_[row] -= weight[a] * force[axis];
+            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0)
+                step_load_[row] -= weight[a] * force[axis];
         if (const int row = row_of_body(driver, axis); row >= 0) step_load_[row] += force[axis];
     }
 }
@@ -301,4 +305,4 @@ void Equilibrium::set_contacts(const Contacts& contacts) {
     face_dissipated_ = at_start ? 0.0 : contacts.dissipated.back();
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -21,13 +21,14 @@ namespace crampfit {
 
 /// Energies of a run so far [J]. In a perfect run work = strain + kinetic + contact + fracture + damped.
 struct EnergyBooks {
-    double work = 0;      // done by edges and bodies
-    double strain = 0;    // in the points, in the ties at a crack tip and in bridged faces
+    double work = 0;    // done by edges and bodies
+    double strain = 0;  // in the points, in the ties at a crack tip and in bridged faces
     double kinetic = 0;
-    double contact = 0;   // in the springs of sliding contact
-    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back;
-                          // and bridged faces
-    double damped = 0;    // by drag, by friction and impact of contacts, and in wood that remembers
+    double contact = 0;  // in the springs of sliding contact
+    double fracture =
+        0;              // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back;
+                        // and bridged faces
+    double damped = 0;  // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
@@ -117,21 +118,21 @@ class ExplicitSolver {
     mutable VelocityMapping mapping_;
 
     // One entry a field.
-    std::vector<double> mass_;        // [kg]
-    std::vector<Vec2> displacement_;  // [m]
-    std::vector<Vec2> velocity_;      // [m/s]
-    std::vector<Vec2> carried_;       // w of VelocityMapping where the nodes do not keep their velocities [m/s]
+    std::vector<double> mass_;             // [kg]
+    std::vector<Vec2> displacement_;       // [m]
+    std::vector<Vec2> velocity_;           // [m/s]
+    std::vector<Vec2> carried_;            // w of VelocityMapping where the nodes do not keep their velocities [m/s]
     std::vector<std::uint8_t> held_axes_;  // a bit an axis where the component is prescribed
-    std::vector<Vec2> acceleration_;  // [m/s^2]
-    std::vector<Vec2> force_;         // [N]
+    std::vector<Vec2> acceleration_;       // [m/s^2]
+    std::vector<Vec2> force_;              // [N]
 
-    std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
-    std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
-    std::vector<double> damped_;      // [pieces of the fields] in this step [J]
-    std::vector<Tip> tips_;           // two a crack: start, end
-    double fastest_crack_ = 0;        // [m/s]
+    std::vector<Vec2> reaction_;    // [edges, then bodies] [N]
+    std::vector<Vec2> face_force_;  // [pairs] what pressed crack faces put on the left one in the last step [N]
+    std::vector<double> damped_;    // [pieces of the fields] in this step [J]
+    std::vector<Tip> tips_;         // two a crack: start, end
+    double fastest_crack_ = 0;      // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

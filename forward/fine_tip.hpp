@@ -11,9 +11,10 @@ namespace crampfit {
 
 /// What the grid misses of the potential at a crack tip that passes a sharp boundary between woods.
 struct MissedEnergy {
-    double energy = 0;                  // to be added to the potential [J]
-    std::vector<double> by_number;      // its slope by the numbers, the grid's displacements as they are [J / unit]
-    std::vector<Vec2> by_displacement;  // and by the displacements of the grid's fields [N]; empty like `by_number` where none is asked for
+    double energy = 0;              // to be added to the potential [J]
+    std::vector<double> by_number;  // its slope by the numbers, the grid's displacements as they are [J / unit]
+    std::vector<Vec2>
+        by_displacement;  // and by the displacements of the grid's fields [N]; empty like `by_number` where none is asked for
 };
 
 /// Boxes about the way of a tip over an advance, one within the other.
@@ -58,4 +59,4 @@ class FineTip {
     std::deque<std::unique_ptr<CutOut>> kept_;  // those asked for last, the last one first: neighbouring places share them
 };
 
-} // namespace crampfit
+}  // namespace crampfit

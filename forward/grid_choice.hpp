@@ -8,12 +8,12 @@ namespace crampfit {
 
 /// The coarsest grid on which a scene at equilibrium is expected to meet an error that is asked for.
 struct GridChoice {
-    double cell = 0;         // [m]
-    double error = 0;        // estimated, relative, of the quantity that has the largest
-    std::string quantity;    // that one
-    double seconds = 0;      // that a run on it will take, estimated from those made
+    double cell = 0;       // [m]
+    double error = 0;      // estimated, relative, of the quantity that has the largest
+    std::string quantity;  // that one
+    double seconds = 0;    // that a run on it will take, estimated from those made
     double seconds_spent = 0;
-    std::string text;        // the same for a person
+    std::string text;  // the same for a person
 };
 
 /// Runs the scene on grids each half as wide as the one before and looks at what they change: force over displacement before the
@@ -23,4 +23,4 @@ struct GridChoice {
 /// Throws InputError naming model.error where the scene is not at equilibrium or no grid of a bearable size meets it.
 GridChoice choose_grid(const Scene& scene, double error);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -48,4 +48,4 @@ class KeptWalk {
     std::unique_ptr<Quasistatic> walk_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -18,4 +18,4 @@ struct NeededLoad {
 /// the load and that energy is a cubic.
 std::optional<NeededLoad> peak_between(const std::array<NeededLoad, 4>& places);
 
-} // namespace crampfit
+}  // namespace crampfit

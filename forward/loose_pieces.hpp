@@ -8,8 +8,8 @@ namespace crampfit {
 
 /// Pieces that cracks have cut free.
 struct LoosePieces {
-    std::vector<int> holds;     // components of displacement, 2 x field + axis, to be held besides what the boundary holds
-    std::vector<bool> loose;    // [fields] of a piece that nothing holds: it carries nothing
+    std::vector<int> holds;   // components of displacement, 2 x field + axis, to be held besides what the boundary holds
+    std::vector<bool> loose;  // [fields] of a piece that nothing holds: it carries nothing
 
     bool is_loose(int field) const { return field < static_cast<int>(loose.size()) && loose[field]; }
 };
@@ -20,4 +20,4 @@ struct LoosePieces {
 LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
                               const std::vector<double>& mass, double heaviest = std::numeric_limits<double>::infinity());
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -20,4 +20,4 @@ std::vector<double> march_times(const Scene& scene, const Plan& plan, const Mate
 Record march(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads,
              const std::function<bool(double)>& go_on);
 
-} // namespace crampfit
+}  // namespace crampfit

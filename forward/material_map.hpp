@@ -9,13 +9,13 @@ namespace crampfit {
 /// What wood is made of at a place, or on average over an area.
 struct LocalWood {
     LayeredElasticity elasticity;
-    double density = 0;          // [kg/m^3]
-    double toughness = 0;        // [J/m^2]
+    double density = 0;                  // [kg/m^3]
+    double toughness = 0;                // [J/m^2]
     Vec2 poisson_ratios = Vec2::Zero();  // stress out of the plane, in plane strain, per stress along the normal and the layers
-    double filled = 0;           // share of the area that is not void
-    double latewood = 0;         // 0 first material .. 1 last, for pictures
-    bool mixed = false;          // an average over more than one wood
-    int material = -1;           // its number; -1: transition wood, or an average
+    double filled = 0;                   // share of the area that is not void
+    double latewood = 0;                 // 0 first material .. 1 last, for pictures
+    bool mixed = false;                  // an average over more than one wood
+    int material = -1;                   // its number; -1: transition wood, or an average
 
     /// E' = E in plane stress, E / (1 - nu^2) in plane strain, along the layers [Pa].
     double plane_modulus() const { return elasticity.coefficients[0]; }
@@ -90,18 +90,18 @@ class MaterialMap {
     LocalWood in_picture(const Vec2& x) const;
 
     const Scene& scene_;
-    std::vector<Material> materials_;           // in the order of labels
-    std::vector<LocalWood> pure_;               // the same, ready made
-    Vec2 picture_offset_ = Vec2::Zero();        // [m]
+    std::vector<Material> materials_;     // in the order of labels
+    std::vector<LocalWood> pure_;         // the same, ready made
+    Vec2 picture_offset_ = Vec2::Zero();  // [m]
     double picture_cos_ = 1.0;
     double picture_sin_ = 0.0;
-    double finest_ = 0.0;                       // size of the finest detail to average over [m]; 0: none
-    Vec2 corner_ = Vec2::Zero();                // of what places count from, in the specimen [m]
-    std::shared_ptr<Known> known_;              // of all parts
+    double finest_ = 0.0;           // size of the finest detail to average over [m]; 0: none
+    Vec2 corner_ = Vec2::Zero();    // of what places count from, in the specimen [m]
+    std::shared_ptr<Known> known_;  // of all parts
     bool is_part_ = false;
     bool homogeneous_ = true;
     bool orthotropic_ = false;
     bool remembers_ = false;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

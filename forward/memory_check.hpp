@@ -8,4 +8,4 @@ namespace crampfit {
 /// growth by `advance` or K, tips in wood that relaxes as they pass; and for time steps where there are none to choose.
 void check_memory(const Scene& scene, bool quasistatic, const MaterialMap& materials, const Discretisation& body);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -48,14 +48,14 @@ class ViscoelasticLaw {
   private:
     struct Element {
         IsotropicModuli moduli;
-        double tau;                       // [s]
-        double left = 1.0, taken = 1.0;   // of a before the step, and of the strain's change in it
-        std::array<double, 3> lost{};     // of the quadratic form of moduli: by a with a, a with the change, the change with itself
+        double tau;                      // [s]
+        double left = 1.0, taken = 1.0;  // of a before the step, and of the strain's change in it
+        std::array<double, 3> lost{};  // of the quadratic form of moduli: by a with a, a with the change, the change with itself
     };
     IsotropicModuli lasting_;
-    double instantaneous_;                // K + 4/3 G [Pa]
+    double instantaneous_;  // K + 4/3 G [Pa]
     std::vector<Element> elements_;
-    Eigen::Matrix4d tangent_;             // the same for all points
+    Eigen::Matrix4d tangent_;  // the same for all points
 };
 
 /// J2 plasticity by radial return (Simo and Taylor 1985; Simo and Hughes 1998, box 3.2), rate-independent.
@@ -108,4 +108,4 @@ class MemoryLaw {
     bool plane_stress_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -23,4 +23,4 @@ NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead)
     return NearTipField(in_axes(stiffness, ahead).inverse());
 }
 
-} // namespace crampfit
+}  // namespace crampfit

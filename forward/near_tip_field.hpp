@@ -99,4 +99,4 @@ class NearTipField {
 /// Of wood of this stiffness in x, y, for a crack that runs in this direction.
 NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead);
 
-} // namespace crampfit
+}  // namespace crampfit

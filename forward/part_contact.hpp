@@ -48,4 +48,4 @@ class PartContact {
     double stored_energy_ = 0.0;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -11,7 +11,8 @@ std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretis
                                            const std::vector<const std::vector<Vec2>*>& displacements);
 
 /// The same in one field, with the cracks as they are.
-ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks, const std::vector<Vec2>& displacement);
+ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
+                         const std::vector<Vec2>& displacement);
 
 /// A place between a row of a record's series and the next.
 struct SeriesPlace {
@@ -69,4 +70,4 @@ class Revisit {
 /// interpolation as all else of the series.
 void read_probes(const Scene& scene, Quasistatic& walk, Record& record);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -47,4 +47,4 @@ struct CellWeights {
 CellWeights cell_weights(ShapeFunction kind, const Vec2& place, const Vec2& cell, const Vec2& half,
                          const std::array<CellEnds, 2>& ends = {});
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -27,4 +27,4 @@ class Strips {
     int cells_, cells_a_strip_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -16,4 +16,4 @@ namespace crampfit {
 Record trace(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk,
              const std::function<bool(double, double)>& go_on);
 
-} // namespace crampfit
+}  // namespace crampfit

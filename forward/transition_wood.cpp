@@ -33,7 +33,7 @@ class DensityLaw {
     double grade_;
 };
 
-} // namespace
+}  // namespace
 
 Material transition_wood(const Material& first, const Material& second, const DensityExponents& exponents, double grade) {
     const DensityLaw law(first.density, second.density, grade);
@@ -46,11 +46,14 @@ Material transition_wood(const Material& first, const Material& second, const De
         return wood;
     }
     const OrthotropicElasticity a = orthotropic(first), b = orthotropic(second);
-    wood.orthotropic = {law.between(a.E_R, b.E_R, exponents.E_R),    law.between(a.E_T, b.E_T, exponents.E_T),
-                        law.between(a.G_RT, b.G_RT, exponents.G_RT), law.ratio(a.nu_RT, b.nu_RT),
-                        law.between(a.E_L, b.E_L, exponents.E_L),    law.ratio(a.nu_LR, b.nu_LR),
+    wood.orthotropic = {law.between(a.E_R, b.E_R, exponents.E_R),
+                        law.between(a.E_T, b.E_T, exponents.E_T),
+                        law.between(a.G_RT, b.G_RT, exponents.G_RT),
+                        law.ratio(a.nu_RT, b.nu_RT),
+                        law.between(a.E_L, b.E_L, exponents.E_L),
+                        law.ratio(a.nu_LR, b.nu_LR),
                         law.ratio(a.nu_LT, b.nu_LT)};
     return wood;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -8,4 +8,4 @@ namespace crampfit {
 /// Where one of the two is orthotropic, isotropic wood counts as orthotropic wood with equal constants all ways.
 Material transition_wood(const Material& first, const Material& second, const DensityExponents& exponents, double grade);
 
-} // namespace crampfit
+}  // namespace crampfit

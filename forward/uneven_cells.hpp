@@ -24,7 +24,7 @@ class UnevenCells {
 
     struct Piece {
         int cell;
-        int point;              // its first, which knows the fields
+        int point;  // its first, which knows the fields
         PointBox box;
         const Unevenness* wood;
     };
@@ -33,8 +33,8 @@ class UnevenCells {
     std::span<const Piece> pieces() const { return pieces_; }
 
     struct State {
-        double energy;                        // [J]
-        Eigen::Matrix<double, 8, 1> force;    // slope of the energy by the displacements of the piece's fields [N]
+        double energy;                      // [J]
+        Eigen::Matrix<double, 8, 1> force;  // slope of the energy by the displacements of the piece's fields [N]
     };
     State state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
 
@@ -54,4 +54,4 @@ class UnevenCells {
     std::map<std::pair<int, PointBox>, Unevenness> cut_;  // of pieces of cells, as they were met
 };
 
-} // namespace crampfit
+}  // namespace crampfit

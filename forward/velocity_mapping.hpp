@@ -17,12 +17,15 @@ namespace crampfit {
 /// is prescribed keep it in the sums. On an undeformed grid none of this is needed: see ExplicitSolver.
 class VelocityMapping {
   public:
-    VelocityMapping(const SolverChoice& choice, const Discretisation& body) : choice_(choice), body_(body), strips_(body.layout) {}
+    VelocityMapping(const SolverChoice& choice, const Discretisation& body)
+        : choice_(choice), body_(body), strips_(body.layout) {}
 
     /// False: the nodes keep their velocities, and nothing here is called.
     bool is_used() const { return choice_.velocity_update != VelocityUpdate::automatic; }
     /// Whether nodes move with what the points carry (FMPM, PIC), or with what they hand back.
-    bool nodes_carry() const { return choice_.velocity_update == VelocityUpdate::fmpm || choice_.velocity_update == VelocityUpdate::pic; }
+    bool nodes_carry() const {
+        return choice_.velocity_update == VelocityUpdate::fmpm || choice_.velocity_update == VelocityUpdate::pic;
+    }
 
     /// Of the fields at the nodes, one entry each.
     struct Nodes {
@@ -40,7 +43,8 @@ class VelocityMapping {
 
     /// FLIP and XPIC, at the end of a step: takes w on by the accelerations, and the nodes' velocities, A w + a dt, to the new A w.
     /// Returns the energy that is lost by that [J].
-    double carry(std::vector<Vec2>& w, std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt, const Nodes& nodes);
+    double carry(std::vector<Vec2>& w, std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt,
+                 const Nodes& nodes);
 
     /// v becomes A v.
     void hand_back(std::vector<Vec2>& v, const Nodes& nodes);
@@ -52,7 +56,7 @@ class VelocityMapping {
     const Discretisation& body_;
     Strips strips_;
     std::vector<Vec2> sum_, term_, extrapolated_, from_points_;  // [fields] kept between calls, to be allocated once
-    std::vector<double> energy_;                  // [strips] [J]
+    std::vector<double> energy_;                                 // [strips] [J]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

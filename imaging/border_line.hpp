@@ -30,7 +30,7 @@ struct BorderGuess {
 
 /// Lays borders through the steepest rises of gray near their guesses, by dynamic programming. What leaves what is photographed, or runs where
 /// nothing counts, is cut off. `valid` (0 or 1, float) and `blank` (255 where nothing is photographed) are in the frame.
-std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
-                                    const std::vector<BorderGuess>& guesses);
+std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank,
+                                    const RingCoordinate& rings, const std::vector<BorderGuess>& guesses);
 
 }  // namespace crampfit

@@ -9,12 +9,12 @@ namespace crampfit {
 
 /// What to tell other things from wood by, all in the growth frame.
 struct WoodView {
-    const cv::Mat& gray;    // float, 0..1
-    const cv::Mat& bgr;     // blue, green, red, float, 0..1; empty: the picture is gray
-    const cv::Mat& around;  // gray of the same ring on both sides, float
+    const cv::Mat& gray;        // float, 0..1
+    const cv::Mat& bgr;         // blue, green, red, float, 0..1; empty: the picture is gray
+    const cv::Mat& around;      // gray of the same ring on both sides, float
     const cv::Mat& coordinate;  // the ring coordinate, float [pixels]
     WoodLevels levels;
-    double ring_width;      // [pixels]
+    double ring_width;  // [pixels]
 };
 
 /// 255 where the picture shows an even black or white that reaches in from one of its corners: what lies around a specimen on a scanner or a

@@ -7,8 +7,9 @@ namespace crampfit {
 
 /// What is measured across a crack's line, at every pixel along it: the crack to the left, sound wood to the right.
 struct OpeningProfile {
-    std::vector<double> opening;      // [px]
-    std::vector<double> along, across;  // by how much it changes when the wood lies a pixel further along or across the line than was thought
+    std::vector<double> opening;  // [px]
+    std::vector<double> along,
+        across;  // by how much it changes when the wood lies a pixel further along or across the line than was thought
 };
 
 /// Where a crack's opening begins.

@@ -27,12 +27,12 @@ class RecordCamera {
     /// Looks at the whole specimen and `margin` [m] around it; `options` give all but the size of the picture. The record must outlive
     /// this; `file` is what errors call it. `wood` is the gray of the bare wood at a place of the specimen [m]; empty: there is a pattern on it.
     /// Throws InputError for a record without points, or a picture of more than 16384 pixels a side.
-    RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin, VirtualCameraOptions options,
-                 const std::function<double(const Vec2&)>& wood = {});
+    RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin,
+                 VirtualCameraOptions options, const std::function<double(const Vec2&)>& wood = {});
 
     const CameraView& view() const { return view_; }
 
-    GrayPicture reference() const;         // of the unloaded specimen
+    GrayPicture reference() const;            // of the unloaded specimen
     GrayPicture photograph(int frame) const;  // may be called from several threads
 
   private:

@@ -17,6 +17,7 @@ std::vector<CrackPaths> crack_paths(const Study& study, const Fit& fit, int thre
 /// Fills in how far the photographed path is from the simulated ones: from places evenly spread along it to the nearest place of a simulated
 /// crack. Only places count that a grown part of one passes by, so neither the crack that was there before, `initial` [m], nor what lies beyond
 /// a tip: how far cracks have gone is another matter than which way.
-void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std::vector<Vec2>>& initial, SimulatedPath& simulated);
+void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std::vector<Vec2>>& initial,
+                   SimulatedPath& simulated);
 
 }  // namespace crampfit

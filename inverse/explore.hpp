@@ -30,6 +30,7 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
 
 /// Puts profile intervals in the place of those of the covariance, and fills in the tables. Uncertainty and exploration are those of
 /// a window of the box.
-void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty, const Exploration& exploration);
+void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty,
+                      const Exploration& exploration);
 
 }  // namespace crampfit

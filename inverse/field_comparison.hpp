@@ -41,9 +41,9 @@ class FieldComparison {
     std::vector<Vec2> modelled(const std::vector<Point>& points, const ProbeReading& reading) const;
     void move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const;
 
-    std::vector<Vec2> places_;                 // [m]
+    std::vector<Vec2> places_;  // [m]
     std::vector<std::vector<Point>> pictures_;
-    double reach_ = 0;                         // from the middle of a subset to its corner [m]
+    double reach_ = 0;  // from the middle of a subset to its corner [m]
     bool camera_moves_ = true;
     std::vector<FitResidual> stations_;
     std::string remark_;

@@ -36,8 +36,8 @@ class SceneRuns {
     struct Setting {
         Eigen::Index parameter;
         double factor;
-        std::string key;                               // of the scene
-        const MachineNumber* of_machine = nullptr;     // instead of a key
+        std::string key;                            // of the scene
+        const MachineNumber* of_machine = nullptr;  // instead of a key
     };
     struct Kept;
 
@@ -48,7 +48,7 @@ class SceneRuns {
     std::vector<Machine> machines_;  // of the experiments; none for a scene alone
     Forward forward_;
     const std::atomic<bool>* stop_;
-    std::optional<double> time_limit_;  // [s]
+    std::optional<double> time_limit_;            // [s]
     std::vector<std::vector<Setting>> settings_;  // of each scene
     std::shared_ptr<Kept> kept_;
 };

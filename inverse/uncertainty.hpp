@@ -16,10 +16,10 @@ struct Uncertainty {
     Eigen::VectorXd lower_95;    // [parameters]
     Eigen::VectorXd upper_95;    // [parameters]
     double reduced_chi_square = 0;
-    std::string message;  // what the intervals rest on, and what cannot be told, for a person
-    double widening = 1;  // s: of variances, for what the noise does not explain
-    double quantile = 2;  // of Student's distribution, from standard error to interval
-    std::string untold = {};  // which parameters cannot be told (apart), for a person; part of `message` too
+    std::string message;                  // what the intervals rest on, and what cannot be told, for a person
+    double widening = 1;                  // s: of variances, for what the noise does not explain
+    double quantile = 2;                  // of Student's distribution, from standard error to interval
+    std::string untold = {};              // which parameters cannot be told (apart), for a person; part of `message` too
     Eigen::MatrixXd slope = {};           // J [residuals x parameters]; empty where it is not known
     Eigen::VectorXd model_variance = {};  // diagonal of V [parameters]; empty where it is not known
 };

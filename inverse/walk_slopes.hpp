@@ -21,7 +21,7 @@ struct WalkSlopes {
 
 /// `near` is the study near the point `values`, exact or to first order (KeptWalks::near), so that small steps give its derivatives.
 /// Absent where a run failed.
-std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near, const Eigen::VectorXd& values,
-                                      const std::vector<Parameter>& parameters);
+std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near,
+                                      const Eigen::VectorXd& values, const std::vector<Parameter>& parameters);
 
 }  // namespace crampfit

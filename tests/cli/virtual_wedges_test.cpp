@@ -38,8 +38,7 @@ double after(const std::string& text, const std::string& words) {
 std::string without_seconds(const std::string& table) {
     std::istringstream lines(table);
     std::string kept, line;
-    while (std::getline(lines, line))
-        kept += line.substr(0, line.rfind(',')) + '\n';
+    while (std::getline(lines, line)) kept += line.substr(0, line.rfind(',')) + '\n';
     return kept;
 }
 
@@ -77,7 +76,8 @@ TEST(SlowVirtualWedges, KilledFitsEndAtTheSameBits) {
     Command command;
     virtual_wedges(command, "--scene wedge --count 1");
     const auto fit = [&](const std::string& output) {
-        return std::vector<std::string>{"fit", command.path("1/study.toml"), "-o", command.path(output), "--threads", "1", "--resume"};
+        return std::vector<std::string>{"fit",     command.path("1/study.toml"), "-o", command.path(output), "--threads", "1",
+                                        "--resume"};
     };
     ASSERT_EQ(command.run(fit("whole.h5")).status, 0);
     std::mt19937 generator(5);
@@ -92,7 +92,8 @@ TEST(SlowVirtualWedges, KilledFitsEndAtTheSameBits) {
     std::printf("%d of 20 were killed before their end\n", killed);
     EXPECT_GT(killed, 5);
     for (const char* table : {"parameters", "residuals", "correlation"})
-        EXPECT_EQ(command.run({"csv", command.path("killed.h5"), table}).out, command.run({"csv", command.path("whole.h5"), table}).out);
+        EXPECT_EQ(command.run({"csv", command.path("killed.h5"), table}).out,
+                  command.run({"csv", command.path("whole.h5"), table}).out);
     EXPECT_EQ(without_seconds(command.run({"csv", command.path("killed.h5"), "runs"}).out),
               without_seconds(command.run({"csv", command.path("whole.h5"), "runs"}).out));
     EXPECT_EQ(command.folder.read("killed.h5.runs").size(), command.folder.read("whole.h5.runs").size());

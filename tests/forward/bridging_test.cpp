@@ -42,7 +42,7 @@ TEST(UnitBridging, TractionIsTheSlopeOfItsEnergy) {
     }
 }
 
-constexpr double drawing_speed = 0.02;  // [m/s]
+constexpr double drawing_speed = 0.02;   // [m/s]
 constexpr Bridging fibres{2e6, 0.1e-3};  // 100 J/m^2
 
 // Two halves of a block that bridged faces alone join are drawn apart by `widest`, and then come back.
@@ -73,15 +73,18 @@ TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
             const Record record = simulate(two_halves({-1e-3, y}, {3e-3, y}, widest));
             double worst = 0.0, furthest = 0.0, work = 0.0, stretch = 0.0;
             for (const Instant& row : record.series) {
-                const double stress = row.force / width, opening = row.displacement - drawing_speed * row.time - stress / modulus * height;
+                const double stress = row.force / width,
+                             opening = row.displacement - drawing_speed * row.time - stress / modulus * height;
                 furthest = std::max(furthest, opening);
                 const bool goes_apart = row.time < widest / drawing_speed;
                 const double most = std::max(0.0, fibres.stress * (1 - furthest / fibres.opening));
-                if (opening > 2e-6) worst = std::max(worst, std::abs(stress - (goes_apart ? most : most * opening / furthest)) / fibres.stress);
+                if (opening > 2e-6)
+                    worst = std::max(worst, std::abs(stress - (goes_apart ? most : most * opening / furthest)) / fibres.stress);
                 if (goes_apart) work = row.external_work, stretch = 0.5 * stress * stress / modulus * height;
             }
             const double off = work / width / (taken(fibres, furthest) + stretch) - 1;
-            std::printf("crack at %.3f mm, drawn apart by %.2f mm: stress off by %.2f %% of the law's, work by %+.3f %%, books by %.3f %%\n",
+            std::printf("crack at %.3f mm, drawn apart by %.2f mm: stress off by %.2f %% of the law's, work by %+.3f %%, books "
+                        "by %.3f %%\n",
                         1e3 * y, 1e3 * widest, 100 * worst, 100 * off, 100 * record.worst_energy_imbalance);
             EXPECT_LT(worst, 2.0 * waves);
             EXPECT_LT(std::abs(off), 0.005);
@@ -108,7 +111,8 @@ TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
         Vec2 left = Vec2::Zero();
         for (const FieldPair& pair : run.solver.cracks().pairs) left += force[pair.left];
         const double length = run.solver.cracks().lines[0].length, wanted = fibres.stress * 0.8 * length;
-        std::printf("crack at %.0f degrees: traction over its length off by %+.3f %%\n", angle, 100 * (-left.dot(left_of(along)) / wanted - 1));
+        std::printf("crack at %.0f degrees: traction over its length off by %+.3f %%\n", angle,
+                    100 * (-left.dot(left_of(along)) / wanted - 1));
         EXPECT_NEAR(-left.dot(left_of(along)), wanted, 0.01 * wanted);  // places at a side count whole or not, 1/16 of a cell
     }
 }
@@ -146,8 +150,9 @@ TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
         scene.stop = {};
         scene.stop.time = 1.3e-3;
         const Instant end = simulate(scene).series.back();
-        std::printf("tip at %.2f mm, crack %.1f of a cell up: G off by %+.2f %%, K_I^2 / E' by %+.2f %% of that far away\n", 1e3 * tip, lift,
-                    100 * (end.G - far + law.energy()) / far, 100 * (end.K_I * end.K_I / plane_modulus() - far + law.energy()) / far);
+        std::printf("tip at %.2f mm, crack %.1f of a cell up: G off by %+.2f %%, K_I^2 / E' by %+.2f %% of that far away\n",
+                    1e3 * tip, lift, 100 * (end.G - far + law.energy()) / far,
+                    100 * (end.K_I * end.K_I / plane_modulus() - far + law.energy()) / far);
         EXPECT_NEAR(end.G, far - law.energy(), 0.03 * far);
         EXPECT_NEAR(end.K_I * end.K_I / plane_modulus(), far - law.energy(), 0.03 * far);
     }
@@ -177,14 +182,14 @@ Growing growing(const Scene& scene) {
 // how far it may be off as a part of that. The grid's own part in it shows without bridges.
 void check_growing(double cell, double lift, std::initializer_list<double> stresses, double most) {
     const Growing plain = growing(strip(cell, lift * cell, 0.02, std::nullopt));
-    std::printf("cell %.2f mm, crack %.1f of one up: without bridges grows at %.1f of 100 J/m^2, J at the tip %.1f\n", 1e3 * cell, lift,
-                plain.far, plain.tip);
+    std::printf("cell %.2f mm, crack %.1f of one up: without bridges grows at %.1f of 100 J/m^2, J at the tip %.1f\n", 1e3 * cell,
+                lift, plain.far, plain.tip);
     for (const double stress : stresses) {
         const Bridging law{stress, 0.1e-3};
         const Growing bridged = growing(strip(cell, lift * cell, 0.02, law));
         const double both = 100.0 + law.energy();
-        std::printf("    with %.1f MPa to %.2f mm at %.1f of %.0f: %+.1f %%; J at the tip %.1f; bridges took %+.1f %% of %.0f\n", 1e-6 * stress,
-                    1e3 * law.opening, bridged.far, both, 100 * (bridged.far / both - 1), bridged.tip,
+        std::printf("    with %.1f MPa to %.2f mm at %.1f of %.0f: %+.1f %%; J at the tip %.1f; bridges took %+.1f %% of %.0f\n",
+                    1e-6 * stress, 1e3 * law.opening, bridged.far, both, 100 * (bridged.far / both - 1), bridged.tip,
                     100 * ((bridged.far - plain.far) / law.energy() - 1), law.energy());
         EXPECT_NEAR(bridged.far, both, most * both);
     }

@@ -72,7 +72,8 @@ TEST(VerificationMemoryLaw, RampAndHoldAreTheConvolution) {
         const double shear = both(shear_modulus(wood), [](const PronyTerm& t) { return t.g; });
         const double bulk = both(bulk_modulus(wood), [](const PronyTerm& t) { return t.k; });
         const double mean = (full[0] + full[1]) / 3;
-        const Strain expected(3 * bulk * mean + 2 * shear * (full[0] - mean), 3 * bulk * mean + 2 * shear * (full[1] - mean), shear * full[2]);
+        const Strain expected(3 * bulk * mean + 2 * shear * (full[0] - mean), 3 * bulk * mean + 2 * shear * (full[1] - mean),
+                              shear * full[2]);
         worst = std::max(worst, (found.stress - expected).norm() / expected.norm());
     }
     std::printf("ramp and hold: worst error %.1e\n", worst);
@@ -146,7 +147,8 @@ TEST(VerificationMemoryLaw, BarYieldsUnloadsYieldsAgain) {
     };
     const double first = 0.06, back = 0.02, last = 0.1;
     const double at_first = Y + tangent * (first - Y / E);
-    for (double e = 0.005; e <= first; e += 0.005) worst = std::max(worst, std::abs(pull(e) - std::min(E * e, Y + tangent * (e - Y / E))));
+    for (double e = 0.005; e <= first; e += 0.005)
+        worst = std::max(worst, std::abs(pull(e) - std::min(E * e, Y + tangent * (e - Y / E))));
     worst = std::max(worst, std::abs(pull(back) - (at_first - E * (first - back))));
     worst = std::max(worst, std::abs(pull(first) - at_first));
     worst = std::max(worst, std::abs(pull(last) - (at_first + tangent * (last - first))));
@@ -180,7 +182,9 @@ TEST(GradientMemoryLaw, TangentIsTheSlopeOfTheStress) {
             Eigen::Matrix3d differences;
             const double h = 1e-6;
             for (int k = 0; k < 3; ++k)
-                differences.col(k) = (Point(start).go(here + h * Strain::Unit(k), 0.7).stress - Point(start).go(here - h * Strain::Unit(k), 0.7).stress) / (2 * h);
+                differences.col(k) = (Point(start).go(here + h * Strain::Unit(k), 0.7).stress -
+                                      Point(start).go(here - h * Strain::Unit(k), 0.7).stress) /
+                                     (2 * h);
             EXPECT_LT((tangent - differences).norm(), 1e-7 * tangent.norm());
             EXPECT_LT((tangent - tangent.transpose()).norm(), 1e-12 * tangent.norm());
         }

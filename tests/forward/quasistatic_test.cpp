@@ -1,9 +1,9 @@
 // The crack's walk at equilibrium, and what a rising displacement makes of it: strips, cantilevers, rings, other toughnesses.
+#include "datasets/error.hpp"
 #include "forward/kept_walk.hpp"
 #include "forward/load_peak.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/trace.hpp"
-#include "datasets/error.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -402,16 +402,20 @@ TEST(GradientWalk, OutputsMoveWithToughness) {
         EXPECT_LT(most, 1.5 * least) << what;
     };
     const auto earlywood = run("EW"), latewood = run("LW");
-    check("latewood, jump from the start", latewood, [](const Record& r) { return displacement_at_length(r, 4.0e-3); }, 0.501);
-    check("earlywood, arrival at 4.95 mm", earlywood, [](const Record& r) { return displacement_at_length(r, 4.95e-3); }, 0.501);
+    check(
+        "latewood, jump from the start", latewood, [](const Record& r) { return displacement_at_length(r, 4.0e-3); }, 0.501);
+    check(
+        "earlywood, arrival at 4.95 mm", earlywood, [](const Record& r) { return displacement_at_length(r, 4.95e-3); }, 0.501);
     check(
         "earlywood, arrival at 6.5 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 6.5e-3); },
         0.501);
     check(
         "earlywood, arrival at 9.0 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 9.0e-3); },
         0.501);
-    check("earlywood, force at 0.14 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.14e-3); }, 1.0);
-    check("earlywood, force at 0.18 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.18e-3); }, 1.0);
+    check(
+        "earlywood, force at 0.14 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.14e-3); }, 1.0);
+    check(
+        "earlywood, force at 0.18 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.18e-3); }, 1.0);
 }
 
 // ---- walks that are kept

@@ -229,7 +229,8 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
     EXPECT_TRUE(wood.stretch.isZero(0.0));
     // Of the cell's left half: what earlywood is short of the average.
     const Unevenness left = materials.unevenness({0.25 * h, 0.5 * h}, {0.25 * h, 0.5 * h}, average, {0.0, 0.0});
-    const Eigen::Matrix3d early = plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
+    const Eigen::Matrix3d early =
+        plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
     EXPECT_LT((left.stretch - early).norm(), 1e-12 * early.norm());
     EXPECT_TRUE(left.coupling.isZero(1e-12 * coupling.norm()) && left.bending.isZero(0.0));
 }

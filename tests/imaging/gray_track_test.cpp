@@ -32,10 +32,10 @@ WoodShot shaken(int seed) {
 
 struct Case {
     const char* what;
-    double angle;    // [rad]
-    double opening;  // at 100 px behind the tip; a fifth of it slides [px]
-    double period;   // of the rings [px]
-    Vec2 pith;       // [px]
+    double angle;        // [rad]
+    double opening;      // at 100 px behind the tip; a fifth of it slides [px]
+    double period;       // of the rings [px]
+    Vec2 pith;           // [px]
     double worst, mean;  // bars: of the distance, and of the mean along the crack [px]
 };
 
@@ -55,8 +55,8 @@ void expect_tips(const std::vector<Case>& cases) {
             ASSERT_EQ(tip.status, TipStatus::ok) << one.what << " " << way;
             const Vec2 error = tip.tip - truth;
             const double along = error.dot(direction);
-            std::printf("%-20s tip at %4.0f %4.0f: off by %5.2f px along, %5.2f px across, said %.2f px\n", one.what, truth.x(), truth.y(), along,
-                        direction.x() * error.y() - direction.y() * error.x(), tip.sigma);
+            std::printf("%-20s tip at %4.0f %4.0f: off by %5.2f px along, %5.2f px across, said %.2f px\n", one.what, truth.x(),
+                        truth.y(), along, direction.x() * error.y() - direction.y() * error.x(), tip.sigma);
             EXPECT_LT(error.norm(), one.worst) << one.what << " " << way;
             sum += along;
             squares += std::pow(along / tip.sigma, 2);
@@ -99,8 +99,7 @@ TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     double worst = 0, sum = 0;
     int count = 0;
     for (const Vec2& point : tip.way) {
-        if (point.x() < 10 || point.x() > columns - 10)
-            continue;
+        if (point.x() < 10 || point.x() > columns - 10) continue;
         const double off = point.y() - crack(point.x());
         worst = std::max(worst, std::abs(off));
         sum += off;
@@ -150,7 +149,8 @@ TEST(VerificationGrayTrack, NoneWhereThereIsNoCrack) {
 }
 
 TEST(VerificationGrayTrack, AnotherPictureIsNotLinedUp) {
-    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10), other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
+    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10),
+        other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
     EXPECT_NE(GrayTracker(camera.take({}), {}).tip(other.take({})).status, TipStatus::ok);
 }
 
@@ -174,8 +174,7 @@ TEST(VerificationGrayTrack, OpeningOfAnyShapeBeginsWhereItDoes) {
             EXPECT_LT(std::abs(start->place - truth), 3 * start->sigma + 0.5) << power;
         }
     OpeningProfile flat{std::vector<double>(140), std::vector<double>(140), std::vector<double>(140)};
-    for (double& value : flat.opening)
-        value = noise(random);
+    for (double& value : flat.opening) value = noise(random);
     EXPECT_FALSE(find_opening_start(flat));
     EXPECT_FALSE(find_opening_start({{1, 0}, {0, 0}, {0, 0}}));
 }

@@ -25,7 +25,9 @@ struct Trip {
 // A sample with the loading at a speed [m/s].
 Trip run(const std::string& sample, double speed, double cell_mm, Overrides further = {}) {
     const auto number = [](double value) { return std::to_string(value); };
-    Overrides overrides = {{"model.cell", number(cell_mm) + " mm"}, {"cracks.0.advance", "0.2 mm"}, {"output.frames", "0"},
+    Overrides overrides = {{"model.cell", number(cell_mm) + " mm"},
+                           {"cracks.0.advance", "0.2 mm"},
+                           {"output.frames", "0"},
                            {"output.samples", "1000"}};
     overrides.emplace_back("solver.kind", speed == at_equilibrium ? "quasistatic" : "explicit");
     if (speed != at_equilibrium) {
@@ -134,7 +136,8 @@ double apart(const Trip& from, const Trip& to) {
         double nearest = INFINITY;
         for (std::size_t k = 0; k + 1 < other.size(); ++k) {
             const Vec2 along = other[k + 1] - other[k];
-            nearest = std::min(nearest, (x - other[k] - std::clamp((x - other[k]).dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm());
+            nearest = std::min(
+                nearest, (x - other[k] - std::clamp((x - other[k]).dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm());
         }
         most = std::max(most, nearest);
     }
@@ -196,9 +199,10 @@ TEST(SlowPaper, TrMinusTakesAnotherWayAtTheHighestRate) {
 TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
     for (const double speed : {at_equilibrium, 2.0, 5.0, 10.0}) {
         const double across = zig_zag(run("tension_tr_plus", speed, 0.2));
-        const double at_45 = zig_zag(run("tension_tr135", speed, 0.2, turned_by_45)), at_135 = zig_zag(run("tension_tr135", speed, 0.2));
-        std::printf("at %.0f m/s: direction varies by %.1f degrees across the rings, %.1f at 45, %.1f at 135 degrees\n", speed, across, at_45,
-                    at_135);
+        const double at_45 = zig_zag(run("tension_tr135", speed, 0.2, turned_by_45)),
+                     at_135 = zig_zag(run("tension_tr135", speed, 0.2));
+        std::printf("at %.0f m/s: direction varies by %.1f degrees across the rings, %.1f at 45, %.1f at 135 degrees\n", speed,
+                    across, at_45, at_135);
         EXPECT_GT(at_45, 1.5 * across);
         EXPECT_GT(at_135, 1.5 * across);
     }
@@ -212,7 +216,8 @@ TEST(SlowPaper, RtIsNotDrawnToLatewood) {
         const Trip from_earlywood = run("tension_rt", speed, 0.1);
         const double outside = spent(from_earlywood).latewood(), straight = latewood_straight_ahead(from_earlywood.scene);
         const double inside = spent(run("tension_rt", speed, 0.1, from_latewood)).latewood();
-        std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, straight on %.0f %%; started in latewood %.0f %%\n",
+        std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, straight on %.0f %%; started in "
+                    "latewood %.0f %%\n",
                     speed, 100 * outside, 100 * straight, 100 * inside);
         EXPECT_LE(outside, straight + 0.02);  // the rows of a record are up to 0.01 of the way apart
         if (speed == at_equilibrium) EXPECT_GT(inside, 0.7);
@@ -225,8 +230,9 @@ TEST(SlowPaper, WedgeIsStraighterThanTension) {
         const Trip wedge = run("wedge", speed, 0.2);
         const double split = zig_zag(wedge), pulled = zig_zag(run("tension_tr_minus", speed, 0.2));
         const int count = falls(wedge.record, 0.1);
-        std::printf("at %.0f m/s: direction varies by %.1f degrees in the wedge test, %.1f in tension; wedge force falls %d times\n", speed,
-                    split, pulled, count);
+        std::printf(
+            "at %.0f m/s: direction varies by %.1f degrees in the wedge test, %.1f in tension; wedge force falls %d times\n",
+            speed, split, pulled, count);
         EXPECT_LT(split, pulled);
         EXPECT_GE(count, 1);
     }
