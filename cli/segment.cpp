@@ -94,8 +94,8 @@ SegmentOptions options_of(const Arguments& arguments) {
     return options;
 }
 
-/// Maps of the whole picture come and go. Memory that went back to the system each time would come back page by page, which took a quarter of
-/// the time.
+/// Maps of the whole picture come and go. Memory that went back to the system each time would come back page by page, which took
+/// a quarter of the time.
 void keep_memory() {
     mallopt(M_MMAP_MAX, 0);
     mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());

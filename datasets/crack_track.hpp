@@ -63,8 +63,8 @@ struct CrackTrack {
 /// What a fit takes as an experiment's data: time, displacement, force and crack length as far as they are known.
 Curves curves_of(const CrackTrack& track);
 
-/// The crack's path as far as the pictures show it [px]: its way in the last image where it was followed; where it never was, from its mouth
-/// through its tips in one image after the other.
+/// The crack's path as far as the pictures show it [px]: its way in the last image where it was followed; where it never was,
+/// from its mouth through its tips in one image after the other.
 std::vector<Vec2> path_of(const CrackTrack& track);
 
 void write(const CrackTrack& track, const std::filesystem::path& file);

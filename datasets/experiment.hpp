@@ -26,8 +26,8 @@ struct Noise {
     std::optional<double> displacement_field = {};  // of each component, at each point [m]; absent: as the file has it
 };
 
-/// Displacement fields of a test's pictures against that of the unloaded specimen, in the specimen's coordinates. Each value is the
-/// mean over a subset of pixels, which counts as a square.
+/// Displacement fields of a test's pictures against that of the unloaded specimen, in the specimen's coordinates. Each value is
+/// the mean over a subset of pixels, which counts as a square.
 struct MeasuredFields {
     std::filesystem::path file;
     std::vector<Vec2> places;      // [points] middles of the subsets, undeformed [m]
@@ -135,8 +135,8 @@ struct SensitivityChoice {
 /// `samples_a_subset` places in it, as correlation averages them, at each picture's instant.
 Probes probes_for(const MeasuredFields& fields);
 
-/// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives at its
-/// middle [samples_a_subset].
+/// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives
+/// at its middle [samples_a_subset].
 std::vector<double> subset_weights(int order);
 
 inline constexpr int samples_a_side = 5;

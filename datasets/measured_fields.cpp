@@ -43,7 +43,8 @@ void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields
     }
 }
 
-/// The points that are compared: as far apart as subsets are wide, so that no pixel counts twice and their errors are independent.
+/// The points that are compared: as far apart as subsets are wide, so that no pixel counts twice and their errors are
+/// independent.
 std::vector<int> independent_points(const FieldSeries& series, const Placement& placement, const Vec2& size) {
     const PointLattice& lattice = series.lattice;
     for (int every = (series.subset + lattice.step - 1) / lattice.step;; ++every) {

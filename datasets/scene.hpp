@@ -64,10 +64,10 @@ struct Picture {
     std::filesystem::path orientation;  // optional second picture; empty: none
 };
 
-/// How the constants of transition wood follow its density between the two classes that it joins: linearly in density^exponent, so
-/// that the law meets both ends. Without an exponent: density^n with the n that joins the ends. Poisson's ratios go linearly.
-/// Defaults for E_R and E_T fit spruce (Jernkvist and Thuvander 2001, Moden and Berglund 2008); E_L and G_RT go with the stretch and
-/// the bend of cell walls (Gibson and Ashby 1997, ch. 10).
+/// How the constants of transition wood follow its density between the two classes that it joins: linearly in density^exponent,
+/// so that the law meets both ends. Without an exponent: density^n with the n that joins the ends. Poisson's ratios go linearly.
+/// Defaults for E_R and E_T fit spruce (Jernkvist and Thuvander 2001, Moden and Berglund 2008); E_L and G_RT go with the stretch
+/// and the bend of cell walls (Gibson and Ashby 1997, ch. 10).
 struct DensityExponents {
     std::optional<double> E;  // of isotropic wood
     double E_R = 1.0;
@@ -100,10 +100,10 @@ struct SpecimenPlan {
     std::shared_ptr<const Specimen> map;  // what `picture` or `file` holds, once it has been read
 };
 
-/// Elastic constants of wood along its own axes: L along the stem, R from the pith to the bark, T along the rings. The first index of
-/// a Poisson's ratio is the direction of the stress, the second that of the contraction: nu_ij = -strain_j / strain_i under stress
-/// along i, so that nu_ij / E_i = nu_ji / E_j (Kollmann and Cote 1968). Specimens lie in the R-T plane; the L constants count in plane
-/// strain alone.
+/// Elastic constants of wood along its own axes: L along the stem, R from the pith to the bark, T along the rings. The first
+/// index of a Poisson's ratio is the direction of the stress, the second that of the contraction: nu_ij = -strain_j / strain_i
+/// under stress along i, so that nu_ij / E_i = nu_ji / E_j (Kollmann and Cote 1968). Specimens lie in the R-T plane; the L
+/// constants count in plane strain alone.
 struct OrthotropicElasticity {
     double E_R = 0.0;   // [Pa]
     double E_T = 0.0;   // [Pa]
@@ -130,8 +130,8 @@ struct PronyTerm {
     double tau = 0.0;  // relaxation time [s]
 };
 
-/// Linear viscoelasticity: G(t) = G [1 - sum g (1 - exp(-t / tau))], the bulk modulus alike with k. The material's E and nu are the
-/// instantaneous ones.
+/// Linear viscoelasticity: G(t) = G [1 - sum g (1 - exp(-t / tau))], the bulk modulus alike with k. The material's E and nu are
+/// the instantaneous ones.
 struct Viscoelasticity {
     std::vector<PronyTerm> prony;  // at least one; the sums of g and of k are below 1
 };
@@ -194,9 +194,9 @@ struct Body {
 enum class Growth { none, start, end, both };
 enum class GrowthDirection { normal_to_opening, hoop_stress, energy_release_rate, straight };
 
-/// What still pulls open faces together, along the crack's normal (fibre bridging, process zone; linear softening after Hillerborg,
-/// Modeer and Petersson 1976): `stress` (1 - d / `opening`) at the largest opening d so far, nothing from `opening` on. Where they close
-/// again it falls in proportion to the opening.
+/// What still pulls open faces together, along the crack's normal (fibre bridging, process zone; linear softening after
+/// Hillerborg, Modeer and Petersson 1976): `stress` (1 - d / `opening`) at the largest opening d so far, nothing from `opening`
+/// on. Where they close again it falls in proportion to the opening.
 struct Bridging {
     double stress = 0.0;        // of faces that begin to open [Pa]
     double opening = 0.0;       // at which it ends [m]

@@ -29,8 +29,8 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a crack
-    /// that runs alongside the edge does not, and moves freely.
+    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a
+    /// crack that runs alongside the edge does not, and moves freely.
     void hold_further_fields(const CrackFields& cracks);
 
     Vec2 velocity_of(int driver) const;          // while it moves [m/s]

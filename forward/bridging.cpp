@@ -48,8 +48,8 @@ bool BridgedFaces::are_in(const Scene& scene) {
                        [](const Crack& crack) { return crack.faces.bridging.has_value(); });
 }
 
-// Each place on the crack goes to the pairs of its cell by their shape functions; a pair that the tip has begun to free is bridged as a
-// whole, as those are that it comes to later.
+// Each place on the crack goes to the pairs of its cell by their shape functions; a pair that the tip has begun to free is
+// bridged as a whole, as those are that it comes to later.
 void BridgedFaces::bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass) {
     const Layout& layout = body_.layout;
     const auto& points = cracks.lines[crack].points;
@@ -96,8 +96,8 @@ bool BridgedFaces::is_cut(int node, const Vec2& on_crack, const Vec2& along) con
     return left && right;
 }
 
-// The faces of a pair that a tip is about to free, were the crack straight about it [m^2]. As above, but pairs farther ahead are not
-// there yet.
+// The faces of a pair that a tip is about to free, were the crack straight about it [m^2]. As above, but pairs farther ahead are
+// not there yet.
 double BridgedFaces::area_ahead(const CrackFields& cracks, const FieldPair& pair) const {
     const Layout& layout = body_.layout;
     const bool at_end = TipTies::is_of(cracks, pair, pair.crack, true);

@@ -12,12 +12,12 @@ namespace crampfit {
 
 namespace {
 
-// A crack that grows through a strip takes the energy of its bridges to 3 % with 7 to 22 cells in the length below, 5 to 9 % too much with
-// 6, and several times as much with 3 (the scene of `VerificationBridging.GrowsAtTheEnergyOfTipAndBridges`).
+// A crack that grows through a strip takes the energy of its bridges to 3 % with 7 to 22 cells in the length below, 5 to 9 % too
+// much with 6, and several times as much with 3 (the scene of `VerificationBridging.GrowsAtTheEnergyOfTipAndBridges`).
 constexpr double least_cells = 7.0;
 
-// E' times the energy over the stress squared, by which faces soften along a crack (Hillerborg, Modeer and Petersson 1976), in the
-// softest wood [m].
+// E' times the energy over the stress squared, by which faces soften along a crack (Hillerborg, Modeer and Petersson 1976), in
+// the softest wood [m].
 double softening_length(const Crack& crack, const MaterialMap& materials, const Discretisation& body) {
     const Bridging& law = *crack.faces.bridging;
     const std::size_t last = crack.points.size() - 1;

@@ -11,8 +11,8 @@ namespace {
 constexpr int explicit_steps_between_searches = 50;
 constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
 
-// Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets the
-// time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
+// Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets
+// the time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
 constexpr double stiffness_in_cells = 10.0;
 
 // Width of the surface with whose mean a facet goes under a round body, and the most of it in radii: the mean of a wheel's own
@@ -24,8 +24,8 @@ constexpr double width_in_radii = 0.2;
 constexpr double most_radius_in_cells =
     16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
 
-// Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a touch
-// coming; from there on it grows evenly.
+// Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a
+// touch coming; from there on it grows evenly.
 constexpr double onset_in_cells = 0.0003;
 constexpr double at_touch =
     0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
@@ -178,8 +178,8 @@ Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) c
                 stiffness_[touch.facet], is_kept ? *kept : Grip{});
 }
 
-// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a force
-// that falls evenly [J].
+// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a
+// force that falls evenly [J].
 double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const {
     double energy = 0.0;
     auto touch = pushed_.begin();

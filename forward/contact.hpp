@@ -10,12 +10,13 @@
 namespace crampfit {
 
 /// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
-/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each facet
-/// that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
+/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each
+/// facet that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
 ///
-/// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of a crack:
-/// displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and fro as it
-/// rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells across.
+/// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of
+/// a crack: displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and
+/// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
+/// across.
 class SlidingBody {
   public:
     SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);

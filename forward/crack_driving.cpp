@@ -17,7 +17,8 @@ double length_of(const std::vector<Vec2>& route) {
     return length;
 }
 
-// Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
+// Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the
+// energies.
 LoadState weighted(const std::vector<const LoadState*>& states, const std::vector<double>& weights) {
     LoadState sum;
     sum.reactions.assign(states[0]->reactions.size(), Vec2::Zero());

@@ -67,8 +67,8 @@ struct Station {
     LoadState at(double time) const;
 
     /// The first time at which the next advance releases as much energy as it costs, with `toughness` the mean over the routes
-    /// [J/m^2], between what is known; infinite where it does not within that [s]. `beyond` it: the energy released goes on as a power
-    /// of the time.
+    /// [J/m^2], between what is known; infinite where it does not within that [s]. `beyond` it: the energy released goes on as a
+    /// power of the time.
     double critical_time(double toughness, bool beyond = false) const;
 };
 

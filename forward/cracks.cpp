@@ -17,8 +17,8 @@ namespace {
 constexpr double pair_compliance = 4.2;
 
 // A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip
-// field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against the
-// exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
+// field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against
+// the exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
 constexpr double tip_lag_of_hats = 0.25;
 constexpr double tip_lag_of_splines = 0.37;
 
@@ -236,8 +236,8 @@ bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
     return false;
 }
 
-// Whether the straight way on from a tip that has come out of the wood meets wood again within a distance: the flanks of a notch lie
-// beside it, and it has to keep them apart.
+// Whether the straight way on from a tip that has come out of the wood meets wood again within a distance: the flanks of a notch
+// lie beside it, and it has to keep them apart.
 bool CrackFields::wood_lies_ahead(const CrackTip& tip, double distance) const {
     const double cell = body_->layout.cell.minCoeff();
     const Box specimen{Vec2::Zero(), body_->layout.size()};
@@ -343,7 +343,8 @@ void CrackFields::renew_ties(int crack) {
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
         const double now = freed(crack, pair.node);
-        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come to.
+        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come
+        // to.
         if (pair.freed < 1.0 || now <= 0.0) pair.freed = now;
         const double f = std::max({least_freed_, pair.freed, smallest});
         pair.tie = (1.0 - f) / (f * pair.compliance);

@@ -41,9 +41,9 @@ struct Polar {
     }
 };
 
-/// What a point is in whose stress xx, yy, xy is `stress_of` its strain xx, yy, 2 xy. With `rotates` these are Biot's strain U - I and its
-/// stress in the frame that turns with the point (F = R U): no stress from rotation alone. Without, the strain is small. The energy is
-/// that of a straight line from no stress to this.
+/// What a point is in whose stress xx, yy, xy is `stress_of` its strain xx, yy, 2 xy. With `rotates` these are Biot's strain U -
+/// I and its stress in the frame that turns with the point (F = R U): no stress from rotation alone. Without, the strain is
+/// small. The energy is that of a straight line from no stress to this.
 template <class Stress>
 PointState state_with(const Mat2& gradient, bool rotates, const Stress& stress_of) {
     PointState state;
@@ -72,9 +72,10 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
     return state_with(gradient, rotates, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d { return stiffness * strain; });
 }
 
-/// Derivative of the stress of `state_with` by the displacement gradient, counted xx, xy, yx, yy [Pa], where that of `stress_of` (xx, yy,
-/// xy of strain xx, yy, 2 xy) is C; without `geometric` only the part that is never negative, which leaves out that stress turns with
-/// the point. Numbers are `double`, or arrays of them for many points at once. C is counted xx-xx, xx-yy, yy-yy, xy-xy, xx-xy, yy-xy.
+/// Derivative of the stress of `state_with` by the displacement gradient, counted xx, xy, yx, yy [Pa], where that of `stress_of`
+/// (xx, yy, xy of strain xx, yy, 2 xy) is C; without `geometric` only the part that is never negative, which leaves out that
+/// stress turns with the point. Numbers are `double`, or arrays of them for many points at once. C is counted xx-xx, xx-yy,
+/// yy-yy, xy-xy, xx-xy, yy-xy.
 template <class Number, class Stress>
 std::array<std::array<Number, 4>, 4> tangent_with(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C,
                                                   const Stress& stress_of, bool rotates, bool geometric) {

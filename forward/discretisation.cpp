@@ -177,8 +177,8 @@ Change Discretisation::change_between(int p, int other) const {
     return (there - here).norm() > rounding * here.norm() ? Change::grain : Change::none;
 }
 
-// Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point, and layers
-// that share it would act too stiff across. Where in the cell each wood lies is told apart (`uneven_cells`).
+// Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point, and
+// layers that share it would act too stiff across. Where in the cell each wood lies is told apart (`uneven_cells`).
 LocalWood Discretisation::wood_of_cell(const MaterialMap& materials, int c) const {
     return materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
 }

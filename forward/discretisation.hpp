@@ -15,8 +15,8 @@ namespace crampfit {
 
 /// How grid and points lie in the specimen. The grid fits the specimen exactly: the asked spacing is rounded, each way on its
 /// own, so that sides lie on grid lines. Cells and nodes are counted row by row from the lower left corner. Nodes are the cells'
-/// corners, or, for quadratic B-splines, the places where a line's coefficients are its values (Greville): the middles of cells, and
-/// the grid's ends.
+/// corners, or, for quadratic B-splines, the places where a line's coefficients are its values (Greville): the middles of cells,
+/// and the grid's ends.
 struct Layout {
     int cells_x = 0;
     int cells_y = 0;

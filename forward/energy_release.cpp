@@ -225,8 +225,8 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
     return Polar(sum / count).turn;
 }
 
-// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the
-// middle.
+// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q
+// in the middle.
 double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end,
                       const Extension& extension, const std::vector<Vec2>& displacement, double thickness) {
     const CrackLine& line = cracks.lines[crack];
@@ -261,8 +261,8 @@ bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     return at_end == (side >= -rounding);
 }
 
-// Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi on
-// its right, or a little beyond where the crack bends.
+// Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi
+// on its right, or a little beyond where the crack bends.
 double angle_from_tip(const CrackLine& line, bool at_end, const Vec2& x) {
     const CrackTip& tip = line.tip(at_end);
     const Vec2 arm = x - tip.position;
@@ -312,10 +312,10 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // place to place (Dolbow and Gosz 2002; Kim and Paulino 2005):
 //     M = int [ (s_ij a_i,k + t_ij u_i,k - t_mn e_mn d_kj) q_k,j + (S_ijmn s_mn t_ij,k - e_ij t_ij,k + rho u_i,tt a_i,k) q_k ] dA
 // with a, t the near-tip displacement and stress of unit K in wood of compliance S, that at the tip; G = K^T H K gives
-// K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen
-// from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
-// Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2.
-// Left out: the speed of a running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
+// K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009).
+// Seen from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as
+// well. Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2. Left out: the speed of a
+// running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
 Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
                        const Extension& extension, const NodalState& nodal, const std::vector<FacePiece>& pieces, bool rotates) {
     const Points& points = body.points;

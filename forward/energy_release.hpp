@@ -43,11 +43,12 @@ struct EnergyReleaseOptions {
 /// and a virtual extension q that follows the crack):
 ///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA
 ///         - int t_i [u_i],k q_k ds,
-/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces that touch
-/// or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the tip. K_I and
-/// K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left, seen toward the tip, ahead, and
-/// turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree within the discretisation error,
-/// K's is the smaller one where the crack is oblique to the grid or boundaries are near (`tips_test`).
+/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces
+/// that touch or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the
+/// tip. K_I and K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left,
+/// seen toward the tip, ahead, and turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree
+/// within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are near
+/// (`tips_test`).
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 

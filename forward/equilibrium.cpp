@@ -11,32 +11,33 @@ namespace crampfit {
 
 namespace {
 
-// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with less,
-// it would spoil the condition of the stiffness; with more, the energy would go in steps.
+// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with
+// less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
 constexpr double least_freed = 0.02;
 
 // Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
 constexpr double face_stiffness_factor = 100.0;
 
-// Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner does not
-// always come below 1e-9.
+// Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner
+// does not always come below 1e-9.
 constexpr double balance = 1e-7;
-// What is less than this part of the largest force out of balance is left over from the solution before: where all else is nothing, as
-// away from a tip that has grown, the factor's parts need not be asked.
+// What is less than this part of the largest force out of balance is left over from the solution before: where all else is
+// nothing, as away from a tip that has grown, the factor's parts need not be asked.
 constexpr double rounding = 1e-11;
 constexpr int most_iterations = 60;
-// Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below, against
-// 1e-3 of a held one.
+// Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below,
+// against 1e-3 of a held one.
 constexpr double least_reciprocal_condition = 1e-10;
 
-// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
-// as much as a new one.
+// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that
+// many cost as much as a new one.
 constexpr double worth_keeping = 2.0;
 // With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
 constexpr double worth_keeping_with_friction = 0.25;
-// A cell keeps its part of the factor until its displacement gradient has changed by this much, and for so many iterations of a solution.
-// Forces are exact all the same, and the steps hardly more (measured: 0.003 to 0.03 take the same time). For the many equilibria,
-// much alike, of a growing crack: else the tangent is exact, which keeps mirror images what they are where equilibrium is unstable.
+// A cell keeps its part of the factor until its displacement gradient has changed by this much, and for so many iterations of a
+// solution. Forces are exact all the same, and the steps hardly more (measured: 0.003 to 0.03 take the same time). For the many
+// equilibria, much alike, of a growing crack: else the tangent is exact, which keeps mirror images what they are where
+// equilibrium is unstable.
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
 constexpr int most_trials = 12;  // of a part of a Newton step
@@ -111,8 +112,8 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     return fields;
 }
 
-// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for crumbs,
-// lighter than a cell, between cracks that cross.
+// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for
+// crumbs, lighter than a cell, between cracks that cross.
 void Equilibrium::find_pieces(bool crumbs_only) {
     if (!sliding_.empty()) return;
     const std::vector<double> mass = field_masses(body_, cracks_.fields());
@@ -265,8 +266,8 @@ void Equilibrium::add_touches(bool geometric) {
     }
 }
 
-// Marks where the tangent is not, to within `slack`, what it was when it was factored. What a growing crack changes is marked already,
-// and in a linear scene that is all.
+// Marks where the tangent is not, to within `slack`, what it was when it was factored. What a growing crack changes is marked
+// already, and in a linear scene that is all.
 void Equilibrium::mark_changes(bool geometric, double slack) {
     const bool other_kind = std::exchange(factored_geometric_, geometric) != geometric;
     if (!free_.empty() || plan_.friction || history_ || other_kind) factor_.mark_all();
@@ -361,8 +362,8 @@ double Equilibrium::take_step(const Eigen::VectorXd& step) {
     return gone;
 }
 
-// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes few
-// directions, which a few steps tell.
+// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes
+// few directions, which a few steps tell.
 Eigen::VectorXd Equilibrium::newton_step(Eigen::VectorXd load) const {
     std::vector<double> share(lessons_.size());
     for (std::size_t k = lessons_.size(); k-- > 0;) {

@@ -19,10 +19,10 @@ namespace crampfit {
 
 /// Static equilibrium of points, grid, crack fields and bodies for given crack tips: the displacement that makes the potential
 ///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions and forces on bodies
-/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or closed
-/// crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi holds what
-/// friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that remembers: an
-/// increment takes its history along, and Pi holds what it has dissipated.
+/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or
+/// closed crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi
+/// holds what friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that
+/// remembers: an increment takes its history along, and Pi holds what it has dissipated.
 ///
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
@@ -35,8 +35,8 @@ class Equilibrium {
     /// From where it stands, solves for what the boundary prescribes at `time`.
     Outcome solve(double time);
 
-    /// One more correction after `solve`, with the tangent at hand, for those who read displacements: it leaves a tenth of what the
-    /// method does where it ends, or less. Not with friction or wood that remembers, where a solution is an increment.
+    /// One more correction after `solve`, with the tangent at hand, for those who read displacements: it leaves a tenth of what
+    /// the method does where it ends, or less. Not with friction or wood that remembers, where a solution is an increment.
     void refine();
 
     /// Moves a crack tip. The displacement stays, new fields start with that of the field that they come from; `solve` next.
@@ -66,8 +66,8 @@ class Equilibrium {
         std::vector<Vec2> fields;   // [fields]
     };
 
-    /// The motions that such motions of the drivers bring about from here on, by the tangent at this equilibrium. None where that is
-    /// not positive definite.
+    /// The motions that such motions of the drivers bring about from here on, by the tangent at this equilibrium. None where that
+    /// is not positive definite.
     std::vector<Motion> motions(const std::vector<std::vector<Vec2>>& drivers);
 
     /// The motion that this load on the points and facets would bring about [N].
@@ -90,8 +90,8 @@ class Equilibrium {
     /// The derivative of G at a tip by a number, with that of the displacements [J/m^2 / unit].
     double release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope);
 
-    /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what friction
-    /// and wood remember. Empty: as it was at the start.
+    /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what
+    /// friction and wood remember. Empty: as it was at the start.
     struct Contacts {
         std::vector<Vec2> moved;                // [drivers] [m]
         std::vector<std::vector<Grip>> bodies;  // [bodies that push]

@@ -33,8 +33,8 @@ void Equilibrium::find_free_bodies() {
     if (std::any_of(scene_.cracks.begin(), scene_.cracks.end(), rubs)) settled_ = displacement_;
 }
 
-// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to begin
-// with.
+// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to
+// begin with.
 void Equilibrium::seat(int sliding) {
     const int driver = sliding_driver_[sliding];
     const Body& rigid = scene_.bodies[driver - boundary_.first_body()];

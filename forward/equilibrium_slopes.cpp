@@ -5,11 +5,11 @@
 
 namespace crampfit {
 
-// At equilibrium the potential's slope along any displacement is nil, so that its derivative by a number p of the materials is the
-// explicit one: dPi/dp = sum of V W_p(grad u) and so on, W_p the energy of the strain with the slope of the stiffness. What a driver
-// feels is the slope of the potential along a motion m that it brings about, R = dPi/ds; the derivative of that is again explicit,
-// dR/dp = sum of V dW_p/d(grad u) : grad m, whatever u does, as long as m is an equilibrium's own motion (symmetry of the
-// second derivatives).
+// At equilibrium the potential's slope along any displacement is nil, so that its derivative by a number p of the materials is
+// the explicit one: dPi/dp = sum of V W_p(grad u) and so on, W_p the energy of the strain with the slope of the stiffness. What a
+// driver feels is the slope of the potential along a motion m that it brings about, R = dPi/ds; the derivative of that is again
+// explicit, dR/dp = sum of V dW_p/d(grad u) : grad m, whatever u does, as long as m is an equilibrium's own motion (symmetry of
+// the second derivatives).
 
 // What motions of the drivers put on the equations, by the tangent where it stands.
 Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {

@@ -43,8 +43,8 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     place_bodies();
 }
 
-// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its forces
-// are found, and by the rest after them.
+// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its
+// forces are found, and by the rest after them.
 double ExplicitSolver::lag() const {
     switch (scene_.solver.stress_update) {
     case StressUpdate::first:

@@ -24,24 +24,24 @@ struct EnergyBooks {
     double work = 0;    // done by edges and bodies
     double strain = 0;  // in the points, in the ties at a crack tip and in bridged faces
     double kinetic = 0;
-    double contact = 0;  // in the springs of sliding contact
-    double fracture =
-        0;              // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back;
-                        // and bridged faces
+    double contact = 0;   // in the springs of sliding contact
+    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip
+                          // back; and bridged faces
     double damped = 0;  // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
 /// displacements), lumped mass. As no point ever leaves its cell, mapping velocities to the points and back by the full mass
-/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps them,
-/// unless the scene asks for another way (VelocityMapping). Displacements may follow velocities at the beginning of a step, at its
-/// end or half and half (`stress_update`): stresses come from displacements.
+/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps
+/// them, unless the scene asks for another way (VelocityMapping). Displacements may follow velocities at the beginning of a step,
+/// at its end or half and half (`stress_update`): stresses come from displacements.
 class ExplicitSolver {
   public:
     /// `threads` share each step; the result does not depend on how many there are.
     ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
 
-    /// Starts from these displacements [m] and velocities [m/s] of the nodes, by place in the undeformed specimen, in place of rest.
+    /// Starts from these displacements [m] and velocities [m/s] of the nodes, by place in the undeformed specimen, in place of
+    /// rest.
     void start(const std::function<Vec2(const Vec2&)>& displacement, const std::function<Vec2(const Vec2&)>& velocity);
 
     /// One time step.

@@ -13,8 +13,9 @@ struct FacePiece {
     double near, far;  // its ends, behind the tip along the crack [m]
 };
 
-/// The stretches of a crack behind a tip, one for each pair of fields that carries such a force, which is spread over as much of the
-/// crack as a cell spans; what of that lies ahead of the tip is left out. `forces` on the left field of each pair [pairs] [N].
+/// The stretches of a crack behind a tip, one for each pair of fields that carries such a force, which is spread over as much of
+/// the crack as a cell spans; what of that lies ahead of the tip is left out. `forces` on the left field of each pair [pairs]
+/// [N].
 std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at_end, std::span<const Vec2> forces,
                                    const Layout& layout);
 

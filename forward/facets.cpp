@@ -87,7 +87,8 @@ std::vector<Stretch> stretches(double length, double step, IsSurface is_surface)
 
 }  // namespace
 
-// The point whose domain holds x. Where none is, the nearest one of the same cell or, if that has none, of the neighbourhood; or -1.
+// The point whose domain holds x. Where none is, the nearest one of the same cell or, if that has none, of the neighbourhood; or
+// -1.
 int Discretisation::point_beside(const Vec2& x) const {
     if (const int own = point_at(x); own >= 0) return own;
     int nearest = -1;
@@ -118,8 +119,8 @@ void Discretisation::find_facets(const Scene& scene) {
         const auto end = cutouts.begin() + static_cast<std::ptrdiff_t>(count);
         return std::any_of(cutouts.begin(), end, [&](const Shape& s) { return inside(s, x); });
     };
-    // Where the outlines of two cutouts fall together, the earlier one has the facets; where a part's falls on the rectangle's side or
-    // on a cutout, that has them.
+    // Where the outlines of two cutouts fall together, the earlier one has the facets; where a part's falls on the rectangle's
+    // side or on a cutout, that has them.
     const auto add_curve = [&](const Curve& curve, std::size_t earlier, bool of_part) {
         const auto is_surface = [&](double s) {
             const Vec2 in = curve.position(s) - beside * curve.normal(s);

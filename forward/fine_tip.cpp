@@ -9,9 +9,9 @@ namespace crampfit {
 
 namespace {
 
-// Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of. What the held outlines take from the wood
-// beyond leaves 1 % in the load that carries a crack across a boundary 30 : 1, half of that with 8 in place of 6; as much is left by cells
-// of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`).
+// Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of. What the held outlines take from
+// the wood beyond leaves 1 % in the load that carries a crack across a boundary 30 : 1, half of that with 8 in place of 6; as
+// much is left by cells of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`).
 constexpr std::array<double, 2> half_widths{6.0, 4.0};
 
 // Boxes begin and end at each second of these cells, so that those of neighbouring places are the same more often.
@@ -26,8 +26,8 @@ constexpr double least_contrast = 2.0;
 // In cells from the way to such a side: all that is missed counts up to the first, nothing from the second on.
 constexpr double near = 3.0, far = 4.0;
 
-// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Far more, or
-// less than half, says that both do not see a crack that has turned sharply alike. The bounds are a judgement: in the paper's
+// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Far more,
+// or less than half, says that both do not see a crack that has turned sharply alike. The bounds are a judgement: in the paper's
 // scenes sound boxes hold 5 % more to 25 % less.
 constexpr double most_of_coarse = 1.1, least_of_coarse = 0.5;
 

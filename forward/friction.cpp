@@ -45,7 +45,8 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     }
     result.tangent = -t * slope.transpose() + force * pressing.curvature * n * t.transpose();
     result.energy = 0.5 * stiffness * result.stretch * result.stretch;
-    // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before + slid).
+    // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before +
+    // slid).
     result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * slid;
     return result;
 }

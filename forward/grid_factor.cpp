@@ -286,8 +286,8 @@ void GridFactor::downward(int top, int forks, const Visit& visit) const {
         true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
 }
 
-// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at a
-// time: most of the work is to fetch them.
+// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at
+// a time: most of the work is to fetch them.
 void GridFactor::forward_columns(const Eigen::MatrixXd& factor, double* y) {
     const auto rows = factor.rows(), columns = factor.cols();
     for (Eigen::Index c = 0; c < columns;) {

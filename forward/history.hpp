@@ -10,11 +10,12 @@ namespace crampfit {
 struct EnergyReleaseOptions;
 struct TipLoad;
 
-/// What points of wood that remembers have been through; no others have a row here. Where several woods lie in a cell they act as layers
-/// there, as elastic wood does: with n the normal of the layers, strains of two layers differ by the symmetric part of a (x) n, with the a
-/// that makes the tractions on the boundary between them the same. Each layer has a memory of its own.
+/// What points of wood that remembers have been through; no others have a row here. Where several woods lie in a cell they act as
+/// layers there, as elastic wood does: with n the normal of the layers, strains of two layers differ by the symmetric part of a
+/// (x) n, with the a that makes the tractions on the boundary between them the same. Each layer has a memory of its own.
 ///
-/// A step begins with `go_to`; `respond` may be called any number of times, from several threads for different points; `settle` ends it.
+/// A step begins with `go_to`; `respond` may be called any number of times, from several threads for different points; `settle`
+/// ends it.
 class History {
   public:
     History(const MaterialMap& materials, const Discretisation& body, PlaneCondition plane);

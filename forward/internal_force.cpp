@@ -45,8 +45,8 @@ void InternalForce::sort_cells() {
 }
 
 double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
-    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y C_ss)
-    // q_y^2], shear coupling aside.
+    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y
+    // C_ss) q_y^2], shear coupling aside.
     const Points& points = body_.points;
     const Vec2 moment = body_.layout.point_size().cwiseAbs2() / 12.0;
     const double both = moment.y() * stiffness(0, 0) + moment.x() * stiffness(1, 1) + moment.sum() * stiffness(2, 2);
@@ -199,8 +199,8 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     return sum;
 }
 
-// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what the
-// stress, shared as the strain is, puts on the change of B as it is.
+// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what
+// the stress, shared as the strain is, puts on the change of B as it is.
 Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement,
                                                                bool geometric) const {
     using Slope = Eigen::Matrix<double, 3, 8>;

@@ -10,8 +10,8 @@
 namespace crampfit {
 
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
-/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side by side; the others,
-/// next to a crack or a cutout, point by point.
+/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side
+/// by side; the others, next to a crack or a cutout, point by point.
 ///
 /// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
 /// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient

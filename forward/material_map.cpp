@@ -408,7 +408,8 @@ Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, co
     return found;
 }
 
-// Samples of a square lattice whose own layers need not run the same way; void has none. `normal` is across layers of different wood.
+// Samples of a square lattice whose own layers need not run the same way; void has none. `normal` is across layers of different
+// wood.
 void MaterialMap::average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                                      LayeredElasticity& mean) const {
     constexpr double as_good_as_parallel = 0.02;  // sine of an angle; taken for straight its square is lost

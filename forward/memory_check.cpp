@@ -14,8 +14,8 @@ void refuse(const Scene& scene, const std::string& key, const std::string& value
     throw InputError(scene.file.string(), key, value, rule);
 }
 
-// The ties at a tip are those of wood that has not relaxed: it must not while the tip passes them. With so many times the time that a
-// Rayleigh wave takes to cross a cell halving the cell changes first growth by 1 %, with a tenth of it by 10 %.
+// The ties at a tip are those of wood that has not relaxed: it must not while the tip passes them. With so many times the time
+// that a Rayleigh wave takes to cross a cell halving the cell changes first growth by 1 %, with a tenth of it by 10 %.
 constexpr double cells_in_relaxation = 500.0;
 
 void check_relaxation_about_tips(const Scene& scene, const Discretisation& body) {

@@ -57,8 +57,9 @@ ViscoelasticLaw::ViscoelasticLaw(const Material& material) : lasting_(IsotropicM
     prepare(0.0);
 }
 
-// While the strain goes evenly a(t) = b + (a - b) exp(-t / tau) with b = change / x, and the dashpot takes int a C a dt / tau, a sum of
-// three products of a and the change with the factors `lost`; the last one is a small difference where x is small, and a series there.
+// While the strain goes evenly a(t) = b + (a - b) exp(-t / tau) with b = change / x, and the dashpot takes int a C a dt / tau, a
+// sum of three products of a and the change with the factors `lost`; the last one is a small difference where x is small, and a
+// series there.
 void ViscoelasticLaw::prepare(double step) {
     constexpr double small = 0.01;
     tangent_ = lasting_.stiffness();
@@ -149,8 +150,8 @@ Response PlasticLaw::respond(const Tensor& strain, const double* before, double*
     const double size = equivalent(trial);
     const double excess = size - flow_stress(before[4]);
     if (excess <= 0.0) return response;
-    // size - 3 G da = flow stress(a + da): the left side less the right falls, and is convex as hardening wears off, so that Newton's
-    // method comes to da from below.
+    // size - 3 G da = flow stress(a + da): the left side less the right falls, and is convex as hardening wears off, so that
+    // Newton's method comes to da from below.
     double da = 0.0;
     for (double off = excess; off > rounding * size;) {
         const double next = da + off / (3.0 * moduli_.shear + hardening(before[4] + da));

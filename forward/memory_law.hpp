@@ -28,8 +28,8 @@ struct Response {
     Eigen::Matrix4d tangent;  // symmetric [Pa]
 };
 
-/// A spring beside Maxwell elements, a spring and a dashpot in line each. With the strain going evenly over a step the strain a of an
-/// element's spring is exactly
+/// A spring beside Maxwell elements, a spring and a dashpot in line each. With the strain going evenly over a step the strain a
+/// of an element's spring is exactly
 ///     a' = exp(-x) a + (1 - exp(-x)) / x (strain' - strain),   x = step / tau
 /// (Taylor, Pister and Goudreau 1970, eq. 12; Simo and Hughes 1998, sec. 10.3).
 /// Remembers: strain zz, xx, yy, 2 xy; what the dashpots have taken [J/m^3]; a of each element.

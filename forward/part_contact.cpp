@@ -33,8 +33,8 @@ PartContact::PartContact(const Discretisation& body, const std::vector<double>& 
     soften(mass, most_frequency_squared);
 }
 
-// What the facets of a node add to its stiffness is bounded by the sum of their springs' shares. A spring joins two nodes, and each of
-// them has springs of both parts' facets: a quarter of what is allowed is each facet's own.
+// What the facets of a node add to its stiffness is bounded by the sum of their springs' shares. A spring joins two nodes, and
+// each of them has springs of both parts' facets: a quarter of what is allowed is each facet's own.
 void PartContact::soften(const std::vector<double>& mass, double most_frequency_squared) {
     const int nodes = body_.layout.nodes_per_cell();
     std::vector<double> added(mass.size(), 0.0);

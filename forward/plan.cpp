@@ -22,8 +22,9 @@ namespace {
 // sees a false strain of half the turn's square, 1e-4, against the 0.02 at which earlywood cracks.
 constexpr double most_rotation = 0.03;
 
-// The same where the motion is that at which a crack is expected to run through. It is little more than a guess and hangs on the toughness, so
-// that runs of a fit could fall to both sides: small strain goes further, and the record says by how much the force would change.
+// The same where the motion is that at which a crack is expected to run through. It is little more than a guess and hangs on the
+// toughness, so that runs of a fit could fall to both sides: small strain goes further, and the record says by how much the force
+// would change.
 constexpr double most_expected_rotation = 0.06;
 
 // Loading that takes this many transits of a wave is taken for equilibrium: inertia then adds its inverse square to the energy.
@@ -211,8 +212,8 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
-// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A / mu,
-// against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
+// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A
+// / mu, against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
 void choose_updates(const Scene& scene, Plan& plan) {
     const SolverChoice& solver = scene.solver;
     std::string how = "kept by the grid";

@@ -5,8 +5,8 @@
 
 namespace crampfit {
 
-/// What probes read in each of some displacement fields [fields x readings] [m]: the displacement of the grid, by its shape functions, of
-/// the fields on the place's own side of each crack.
+/// What probes read in each of some displacement fields [fields x readings] [m]: the displacement of the grid, by its shape
+/// functions, of the fields on the place's own side of each crack.
 std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
                                            const std::vector<const std::vector<Vec2>*>& displacements);
 
@@ -43,8 +43,8 @@ class WayFinder {
     double share_ = 0;
 };
 
-/// The equilibria of a walk that a record has rows of. A walk keeps no displacements: each is solved for anew, with the cracks as they
-/// were then.
+/// The equilibria of a walk that a record has rows of. A walk keeps no displacements: each is solved for anew, with the cracks as
+/// they were then.
 class Revisit {
   public:
     /// All of them must outlive this, but for `body`: the specimen at rest, without cracks.

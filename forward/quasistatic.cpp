@@ -15,9 +15,10 @@ namespace {
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
 
-// An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where stations are
-// cheap, in more, and in more still about a narrow peak of the load that the crack needs. With two, latewood of three cells and 30 times as stiff
-// puts fitted toughnesses off by 5 to 10 %, with four by 0.5 (`scripts/virtual_wedges --scene opened --finer --seed 103`).
+// An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where
+// stations are cheap, in more, and in more still about a narrow peak of the load that the crack needs. With two, latewood of
+// three cells and 30 times as stiff puts fitted toughnesses off by 5 to 10 %, with four by 0.5 (`scripts/virtual_wedges --scene
+// opened --finer --seed 103`).
 constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4, least_stations_in_peak = 8;
 
 // Into how many steps the loading of a scene that is not linear is divided.
@@ -256,9 +257,9 @@ bool Quasistatic::know_linear(std::size_t number) {
     return true;
 }
 
-// Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
-// asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
-// when a crack has grown at the same time it falls.
+// Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the
+// one asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to,
+// and when a crack has grown at the same time it falls.
 bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
     outcome_ = equilibrium_.solve(time);

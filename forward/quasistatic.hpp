@@ -15,15 +15,15 @@
 
 namespace crampfit {
 
-/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
-/// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
-/// crack took when it was first followed, so that other toughnesses find most of what they need here.
+/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them
+/// equilibria at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way
+/// that the crack took when it was first followed, so that other toughnesses find most of what they need here.
 ///
-/// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there stations
-/// of a linear scene stand closer, whatever the toughness.
+/// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there
+/// stations of a linear scene stand closer, whatever the toughness.
 ///
-/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing tells
-/// apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
+/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing
+/// tells apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
 ///
 /// In a linear scene three states say all about a station. Else equilibria are known at even times, and between them by
 /// interpolation.
@@ -38,16 +38,17 @@ class Quasistatic {
                 const std::vector<std::string>& numbers = {}, int threads = 1);
     ~Quasistatic();
 
-    /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
-    /// of each number.
+    /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0
+    /// ln(p / p_0) of each number.
     void shift(const std::vector<double>& by);
 
-    /// From now on states that are not known need not be found where others of the same place are: they follow from these, roughly.
+    /// From now on states that are not known need not be found where others of the same place are: they follow from these,
+    /// roughly.
     void set_rough(bool rough);
 
-    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
-    /// has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which one
-    /// moves. `now` is how far the load has come [s].
+    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing
+    /// tip has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which
+    /// one moves. `now` is how far the load has come [s].
     bool reach(std::size_t station, double now);
 
     /// The station, with all its states that have been asked for. It must have been reached.
@@ -59,8 +60,8 @@ class Quasistatic {
         double toughness = 0;                                   // that it overcomes: the mean over the route [J/m^2]
     };
 
-    /// When the crack moves on from a station if the wood is as tough as this. Where that was due before `now`, roughly when: from
-    /// what is known already or, `closely`, from a state not long before.
+    /// When the crack moves on from a station if the wood is as tough as this. Where that was due before `now`, roughly when:
+    /// from what is known already or, `closely`, from a state not long before.
     Critical critical(std::size_t station, const MaterialMap& materials, double now, bool closely = false);
 
     /// What a station is like at a time.

@@ -5,8 +5,8 @@
 #include <bit>
 #include <cmath>
 
-// The way of the cracks: which tips move on from a place, where to, and when. Each tip, or front of tips that are alike, is tried:
-// it goes its own next advance while the others stand, and the one whose advance pays for itself at the least load moves.
+// The way of the cracks: which tips move on from a place, where to, and when. Each tip, or front of tips that are alike, is
+// tried: it goes its own next advance while the others stand, and the one whose advance pays for itself at the least load moves.
 
 namespace crampfit {
 
@@ -14,12 +14,12 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that between
-// the tips of a symmetric specimen, and no grid tells them apart.
+// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that
+// between the tips of a symmetric specimen, and no grid tells them apart.
 constexpr double alike = 1e-4;
 
-// A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has changed
-// since, is this many times that of another.
+// A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has
+// changed since, is this many times that of another.
 constexpr double far_above = 1.5;
 
 // G at the tip over toughness below which a crack is not about to move.
@@ -28,8 +28,8 @@ constexpr double far_below = 0.3;
 // Of a single tip in a linear scene so many of the last places can be come back to: more than closer stations ask for.
 constexpr std::size_t kept_places = 32;
 
-// Second difference of the energy released over the least of three, above which stations stand closer: at an eighth of it a parabola has
-// its least between them, and the load its peak half of that higher.
+// Second difference of the energy released over the least of three, above which stations stand closer: at an eighth of it a
+// parabola has its least between them, and the load its peak half of that higher.
 constexpr double narrow = 0.04;
 
 bool is_narrow(double before, double least, double after) {
@@ -117,7 +117,8 @@ bool Quasistatic::follow_leader(std::size_t place) {
     return true;
 }
 
-// Lets these tips be the ones that move on from a place, and finds their routes. False where an equilibrium on the way is missing.
+// Lets these tips be the ones that move on from a place, and finds their routes. False where an equilibrium on the way is
+// missing.
 bool Quasistatic::let_move(int number, unsigned tips, double now) {
     Place& place = places_[number];
     if (place.tips == tips) return true;
@@ -156,8 +157,8 @@ bool Quasistatic::reach(std::size_t station, double now) {
     return true;
 }
 
-// Tells where the way goes on from its last place: an increment, or two with closer places between them where the second place is one of
-// narrowly least energy released. At regular places only.
+// Tells where the way goes on from its last place: an increment, or two with closer places between them where the second place is
+// one of narrowly least energy released. At regular places only.
 bool Quasistatic::extend(double now) {
     const int last = way_.back();
     const unsigned tips = places_[last].tips;
@@ -180,8 +181,8 @@ double Quasistatic::released(int number, int time) {
     return places_[number].states.at(time).potential - places_[further].states.at(time).end_potential;
 }
 
-// Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of narrowly
-// least energy released; else none. First half way to either side, then about the least of these.
+// Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of
+// narrowly least energy released; else none. First half way to either side, then about the least of these.
 std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, double now) {
     const int time = time_until(now);
     std::map<int, std::pair<int, double>> found;  // by quarters of an increment from the first: place, and energy released
@@ -207,7 +208,8 @@ std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, dou
     return places;
 }
 
-// A place some quarters of an increment beyond a regular one, with what lies an advance ahead of it; -1 where there is no equilibrium.
+// A place some quarters of an increment beyond a regular one, with what lies an advance ahead of it; -1 where there is no
+// equilibrium.
 int Quasistatic::place_between(int number, int quarters, double now) {
     const unsigned tips = places_[number].tips;
     const int between = next(number, {tips, quarters}, now);
@@ -335,7 +337,8 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         const MovingTip& tip = station.moving.front();
         return station.states.at(time).tips[2 * tip.crack + tip.at_end].G < far_below * toughness;
     };
-    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new one.
+    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new
+    // one.
     int known = low;
     const auto both_known = [&](int time) {
         return places_[number].states.count(time) && places_[places_[number].further].states.count(time);

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-// What is kept of each equilibrium beside its state: what the scene's probes read there, and the derivatives of both by numbers of the
-// materials, with which states are moved to first order.
+// What is kept of each equilibrium beside its state: what the scene's probes read there, and the derivatives of both by numbers
+// of the materials, with which states are moved to first order.
 
 namespace crampfit {
 
@@ -28,8 +28,8 @@ std::optional<double> multiple(const std::vector<Vec2>& wanted, const std::vecto
 
 }  // namespace
 
-// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know next to
-// nothing.
+// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know
+// next to nothing.
 void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const {
     constexpr double beside = 2.0;  // [wide cells]
     const double reach = beside * coarse()->body_.layout.cell.maxCoeff();
@@ -62,7 +62,8 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
     if (!shift_.empty()) show_shifted(number, time);
 }
 
-// Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear scene.
+// Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear
+// scene.
 bool Quasistatic::goes_with_load(const std::vector<Vec2>& drivers) const {
     const Boundary& boundary = equilibrium_.boundary();
     bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium_.time() > 0.0;

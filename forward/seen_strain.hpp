@@ -31,9 +31,9 @@ inline Eigen::Vector3d strain_of(const Mat2& gradient, bool rotates) {
     return {strain(0, 0), strain(1, 1), 2.0 * strain(0, 1)};
 }
 
-/// What the law of points that remember is told of their strain. Plastic wood flows without a change of volume, which in plane strain
-/// four points a cell cannot all do at once: there they share the mean of their dilatation (Nagtegaal, Parks and Rice 1974; Hughes
-/// 1980). The work of stresses s then is that of `shared(s)` with the strains themselves.
+/// What the law of points that remember is told of their strain. Plastic wood flows without a change of volume, which in plane
+/// strain four points a cell cannot all do at once: there they share the mean of their dilatation (Nagtegaal, Parks and Rice
+/// 1974; Hughes 1980). The work of stresses s then is that of `shared(s)` with the strains themselves.
 class SeenStrains {
   public:
     SeenStrains(const Discretisation& body, const History& history, const PointGroup& group,

@@ -69,15 +69,15 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
-// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction hangs on
-// the way to a state, which is not gone again here.
+// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction
+// hangs on the way to a state, which is not gone again here.
 bool small_strain_is_a_guess(const Scene& scene, const Plan& plan, const Record& record) {
     const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
     return ended && plan.grows && !plan.rotates && !plan.friction && scene.solver.strain == StrainMeasure::automatic;
 }
 
-// Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest that the
-// edges go while the specimen carries a load.
+// Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest
+// that the edges go while the specimen carries a load.
 void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                         Quasistatic& walk, Record& record) {
     constexpr double carries = 0.1;  // of the largest strain energy

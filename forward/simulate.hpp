@@ -21,13 +21,14 @@ struct SimulateOptions {
     int threads = 1;                                    // that share the work of a run; a fit may rather run scenes side by side
 };
 
-/// Runs one scene. The result does not depend on the number of threads. A picture or specimen file must have been read into `scene.specimen.map` before.
-/// Where the scene gives an error in place of a cell, its grid is chosen first (`choose_grid`), and the record's explanation says how.
-/// Throws InputError when the scene asks for what no solver here does. A run that goes unstable is a status.
+/// Runs one scene. The result does not depend on the number of threads. A picture or specimen file must have been read into
+/// `scene.specimen.map` before. Where the scene gives an error in place of a cell, its grid is chosen first (`choose_grid`), and
+/// the record's explanation says how. Throws InputError when the scene asks for what no solver here does. A run that goes
+/// unstable is a status.
 Record simulate(const Scene& scene, const SimulateOptions& options = {});
 
-/// The largest ratio of kinetic to strain energy in the series, where the strain energy is a tenth of its largest value or more. Loading
-/// counts as quasi-static up to a few percent (`quasistatic_share`).
+/// The largest ratio of kinetic to strain energy in the series, where the strain energy is a tenth of its largest value or more.
+/// Loading counts as quasi-static up to a few percent (`quasistatic_share`).
 double kinetic_share(const Record& record);
 constexpr double quasistatic_share = 0.05;
 

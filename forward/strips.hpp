@@ -5,8 +5,8 @@
 
 namespace crampfit {
 
-/// Rows of cells in strips. Every second strip is taken first, then the others: strips of one turn share no node, so that any number
-/// of threads adds to the nodes in the same order and comes to the same bits.
+/// Rows of cells in strips. Every second strip is taken first, then the others: strips of one turn share no node, so that any
+/// number of threads adds to the nodes in the same order and comes to the same bits.
 class Strips {
   public:
     explicit Strips(const Layout& layout)

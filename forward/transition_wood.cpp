@@ -18,7 +18,8 @@ class DensityLaw {
     DensityLaw(double first, double second, double grade)
         : span_(std::log(second / first)), here_(std::log((first + grade * (second - first)) / first)), grade_(grade) {}
 
-    // Linear in density^exponent; without one the power of density through both ends. Ends of equal density leave the grade itself.
+    // Linear in density^exponent; without one the power of density through both ends. Ends of equal density leave the grade
+    // itself.
     double between(double first, double second, const std::optional<double>& exponent) const {
         const bool level = std::abs(span_) < 1e-12;
         if (!exponent) return first * std::pow(second / first, level ? grade_ : here_ / span_);

@@ -73,8 +73,8 @@ struct Band {
     }
 };
 
-/// The median over the columns of their steepest rise. Columns without any do not count, such as beside a specimen that is narrower than its
-/// picture.
+/// The median over the columns of their steepest rise. Columns without any do not count, such as beside a specimen that is
+/// narrower than its picture.
 double usual_rise(const cv::Mat& slope) {
     cv::Mat highest;
     cv::reduce(slope, highest, 0, cv::REDUCE_MAX);
@@ -98,8 +98,8 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<RowRange>& photo
     return {rows.begin<float>(), rows.end<float>()};
 }
 
-/// How gray rises down the columns of the finely straightened picture; 0 where that is not known. Where the LW of fine rings is but a few pixels
-/// wide, smoothing would move its steepest side away from it.
+/// How gray rises down the columns of the finely straightened picture; 0 where that is not known. Where the LW of fine rings is
+/// but a few pixels wide, smoothing would move its steepest side away from it.
 cv::Mat slope_across(const StraightWood& wood, double room) {
     const StraightPicture fine = wood.blurred_along(2.0);
     const double sigma = std::clamp(0.04 * room, 0.3, 1.0);

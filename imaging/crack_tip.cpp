@@ -175,8 +175,9 @@ double jump_at(const std::vector<Sample>& samples, const Line& line, int subset)
     return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : 0;
 }
 
-/// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip by up to half its
-/// width: the tip is taken in between. None where the last is the last of the lattice: then the tip is farther on.
+/// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip
+/// by up to half its width: the tip is taken in between. None where the last is the last of the lattice: then the tip is farther
+/// on.
 std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<Sample>& samples, const FieldGeometry& geometry) {
     Vec2 middle = Vec2::Zero();
     for (const Vec2& place : torn) middle += place / static_cast<double>(torn.size());

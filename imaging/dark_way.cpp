@@ -189,8 +189,8 @@ cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, const 
     return mouth;
 }
 
-/// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack does; else the
-/// end that is clearly wider; else the one nearer to the border.
+/// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack
+/// does; else the end that is clearly wider; else the one nearer to the border.
 bool back_is_mouth(const DarkWay& way, const cv::Mat& gray, bool back_is_nearer) {
     const auto beyond = [&](bool back) {
         const cv::Point2d end = back ? way.points.back() : way.points.front(), d = direction_at(way.points, back, heading);
@@ -235,8 +235,8 @@ DarkWay middle_of(const cv::Mat& set, const Ground& ground) {
     return way;
 }
 
-/// The nearest pixel of another patch that a line goes on to from one of its ends; the place itself where there is none. Patches in `taken`
-/// are the line's own.
+/// The nearest pixel of another patch that a line goes on to from one of its ends; the place itself where there is none. Patches
+/// in `taken` are the line's own.
 std::pair<cv::Point, int> next_patch(const Patches& patches, const std::vector<char>& taken, const cv::Point2d& end,
                                      const cv::Point2d& onward) {
     std::pair<cv::Point, int> best{cv::Point(end), 0};
@@ -305,8 +305,9 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     const Contrast contrast = compare(before, now, counts, inner, least, tolerance);
     const std::optional<DarkWay> way = line_in(contrast, ground);
     if (!way) return std::nullopt;
-    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well. Where the
-    // specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the crack.
+    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well.
+    // Where the specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the
+    // crack.
     const int opened = static_cast<int>(std::ceil(*std::ranges::max_element(way->half_width)));
     const bool apart = opened > tolerance && !way->ends_inside;
     if (!apart && contrast.is_crack()) return way;

@@ -77,8 +77,8 @@ cv::Mat strip_along(const cv::Mat& picture, const std::vector<cv::Point2d>& line
     return strip;
 }
 
-/// A crack that opens within a strip pushes wood out at its sides: the light that is missing, over that of the wood at the sides, is the
-/// opening, whatever the strip shows in between.
+/// A crack that opens within a strip pushes wood out at its sides: the light that is missing, over that of the wood at the sides,
+/// is the opening, whatever the strip shows in between.
 OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, const std::vector<cv::Point2d>& line, int reach) {
     const cv::Mat before = strip_along(reference, line, reach), now = strip_along(seen, line, reach);
     const int count = before.rows, last = before.cols - 1;

@@ -70,7 +70,8 @@ std::vector<RingFigures> ring_figures(const std::vector<BorderLine>& borders, co
             width += along_growth / std::sqrt(1 + steep * steep);
             for (int v = static_cast<int>(std::floor(inner.at(u))) + 1; v <= outer.at(u); ++v) {
                 if (features.at<std::uint8_t>(v, u) == static_cast<int>(Feature::background))
-                    continue;  // rays, cracks and marks hide wood whose class is that of the ring around, and more of the LW than of the EW
+                    continue;  // rays, cracks and marks hide wood whose class is that of the ring around, and more of the LW than
+                               // of the EW
                 ++wood;
                 late += classes.at<std::uint8_t>(v, u) == latewood;
             }

@@ -70,8 +70,8 @@ OrientationScale first_scale(cv::Size picture) {
     return {2, {window, window}};
 }
 
-/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along them, where they
-/// wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
+/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along
+/// them, where they wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
 OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
     if (!(ring_width > 0)) {
         const double window = std::clamp(shorter_side(frame.size()) / 25, 6.0, 60.0);

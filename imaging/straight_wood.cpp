@@ -8,8 +8,8 @@
 namespace crampfit {
 namespace {
 
-/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) / 12 add up to
-/// sigma^2 within 1 %.
+/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) /
+/// 12 add up to sigma^2 within 1 %.
 cv::Mat running_means(const cv::Mat& values, double sigma) {
     constexpr int means = 3;
     const int narrow = 2 * static_cast<int>((std::sqrt(12 * sigma * sigma / means + 1) - 1) / 2) + 1;

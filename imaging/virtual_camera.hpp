@@ -37,9 +37,9 @@ using Coverage = std::function<bool(const Vec2&)>;
 /// Gray of the surface at a place of the reference picture [px], 0..255.
 using Surface = std::function<double(const Vec2&)>;
 
-/// Photographs a surface that moves with a given displacement: a speckle pattern, if no other is given. The pattern is a sum of Gaussian spots
-/// at random places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and
-/// the rounding to whole grays.
+/// Photographs a surface that moves with a given displacement: a speckle pattern, if no other is given. The pattern is a sum of
+/// Gaussian spots at random places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the
+/// camera's noise and the rounding to whole grays.
 class VirtualCamera {
   public:
     /// Throws InputError for bad options.
@@ -48,8 +48,8 @@ class VirtualCamera {
     /// The picture of the pattern at rest; `shot` numbers the picture: another number, other noise.
     GrayPicture photograph(std::uint64_t shot) const;
 
-    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1. Places of the
-    /// reference that `covered` says no to are no material, and show `gap_gray`.
+    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1. Places of
+    /// the reference that `covered` says no to are no material, and show `gap_gray`.
     GrayPicture photograph(const PlaneDisplacement& displacement, std::uint64_t shot, const Coverage& covered = {}) const;
 
   private:

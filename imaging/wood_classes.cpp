@@ -58,8 +58,8 @@ class RingProfile {
         sum_[i] += gray;
         ++count_[i];
     }
-    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very beginning. Where an end
-    /// is not known it is what the means tend to there.
+    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very
+    /// beginning. Where an end is not known it is what the means tend to there.
     WoodLevels extremes(const std::optional<BorderGrays>& inner, const std::optional<BorderGrays>& outer) const {
         const std::size_t n = sum_.size(), reach = n / 40;
         std::vector<cv::Point2d> means;  // over the place in the ring, in steps

@@ -52,8 +52,8 @@ class Objective {
     Objective branch(int budget, int threads) const;
     void join(const Objective& branch);
 
-    /// Puts what `judge` makes of each run in the place of what it was. Not while branches are at work; those made before keep what
-    /// they have.
+    /// Puts what `judge` makes of each run in the place of what it was. Not while branches are at work; those made before keep
+    /// what they have.
     void judge_anew(const std::function<Evaluation(const Run&)>& judge);
 
     Eigen::Index parameters() const { return parameters_; }

@@ -13,8 +13,8 @@
 
 namespace crampfit {
 
-/// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes but
-/// the machine that it is tested on, or another scene: the last records of each are kept.
+/// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes
+/// but the machine that it is tested on, or another scene: the last records of each are kept.
 class SceneRuns {
   public:
     /// Throws InputError for a key that no scene has. The study must outlive this; `stop` may be null.

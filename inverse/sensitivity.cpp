@@ -104,8 +104,8 @@ std::optional<WalkSlopes> slopes_at(const Study& study, const KeptWalks& walks, 
 
 using Slopes = std::function<std::optional<WalkSlopes>()>;
 
-// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where the
-// solver has none.
+// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where
+// the solver has none.
 void apply_method(const Study& study, const UnitBox& box, Objective& objective, const Slopes& slopes, unsigned seed,
                   Sensitivity& result) {
     const int samples = study.sensitivity.samples;

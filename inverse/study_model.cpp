@@ -18,8 +18,8 @@ const Study& checked(const Study& study) {
     return study;
 }
 
-// The number whose square is the loss of r, with the sign of r. The bends are those at which a fit to normal noise has 95 % of the
-// efficiency of least squares (Holland and Welsch 1977, table 1).
+// The number whose square is the loss of r, with the sign of r. The bends are those at which a fit to normal noise has 95 % of
+// the efficiency of least squares (Holland and Welsch 1977, table 1).
 double softened(double r, Loss loss) {
     constexpr double huber = 1.345, cauchy = 2.385;
     switch (loss) {

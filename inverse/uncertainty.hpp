@@ -26,8 +26,8 @@ struct Uncertainty {
 
 /// Intervals about the best run, from how the residuals change with the parameters near it. Runs the differences about
 /// the best point that have not been run yet. `curve_lengths` are the lengths of the measured curves, in the order in
-/// which the residuals hold them; priors follow. `names` are the parameters'; `step` is that of differences, a part of the box. There
-/// must be a usable run.
+/// which the residuals hold them; priors follow. `names` are the parameters'; `step` is that of differences, a part of the box.
+/// There must be a usable run.
 ///
 /// covariance = s (J^T J)^-1 + V, J being the slope of a polynomial fitted to the runs about the best point and
 ///  s = max(1, chi^2 tau), chi^2 the reduced chi-square and tau the correlation time of the residuals along their

@@ -93,8 +93,8 @@ Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eige
     for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
         polish(cheap, order[static_cast<std::size_t>(i)].x);
     }
-    if (cheap
-            .best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes its shape
+    if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes
+                         // its shape
         Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), threads);
         minimize(branch, cheap.best()->x, {"crs2", seed});
         cheap.join(branch);

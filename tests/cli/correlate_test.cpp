@@ -153,8 +153,8 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_TRUE(std::isnan(curves.crack_length[3]));
 }
 
-// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where the gap covers a
-// pixel's centre, and so nothing of the last 5 px, which are open by less than 0.7 px.
+// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where
+// the gap covers a pixel's centre, and so nothing of the last 5 px, which are open by less than 0.7 px.
 TEST(SystemTrack, PlainGrayIsTrackedByTheLineThatOpens) {
     Command command;
     const VirtualCamera plain({.columns = 240, .rows = 200, .contrast = 0.5});

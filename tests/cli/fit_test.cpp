@@ -109,8 +109,8 @@ TEST(SystemCommand, BadStudyIsStatusTwoAndNamesFileAndKey) {
     EXPECT_FALSE(std::filesystem::exists(command.path("fit.h5")));
 }
 
-// A fixture that gives way and begins loose: what it does to the curve takes no further run, and with its compliance given the modulus
-// and the slack are found as exactly as the data say them.
+// A fixture that gives way and begins loose: what it does to the curve takes no further run, and with its compliance given the
+// modulus and the slack are found as exactly as the data say them.
 TEST(SystemCommand, FitSeesThroughTheMachine) {
     Command command;
     command.folder.write("scene.toml", slow_scene());

@@ -5,7 +5,8 @@
 
 namespace {
 
-// Rows of the series, with all their digits, after a run with so many threads, asked for by option and by the libraries' variables.
+// Rows of the series, with all their digits, after a run with so many threads, asked for by option and by the libraries'
+// variables.
 std::string series(const std::string& scene, const std::string& kind, const std::string& threads) {
     for (const char* variable : {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"}) ::setenv(variable, threads.c_str(), 1);
     Command command;

@@ -1,5 +1,5 @@
-// Virtual wedge tests, whose truth is known: how far off fits are, how often their intervals hold it, and whether it matters where they
-// start or that they are killed on the way. `scripts/virtual_wedges` runs more of them.
+// Virtual wedge tests, whose truth is known: how far off fits are, how often their intervals hold it, and whether it matters
+// where they start or that they are killed on the way. `scripts/virtual_wedges` runs more of them.
 #include "tests/cli/command.hpp"
 
 #include <gtest/gtest.h>
@@ -44,8 +44,8 @@ std::string without_seconds(const std::string& table) {
 
 }  // namespace
 
-// The truth lies on cells half as wide. Of intervals that hold it 95 times in a hundred, 5 or fewer of eight do six times in a thousand
-// (binomial: 0.0058).
+// The truth lies on cells half as wide. Of intervals that hold it 95 times in a hundred, 5 or fewer of eight do six times in a
+// thousand (binomial: 0.0058).
 TEST(SlowVirtualWedges, EightLinearTestsOnFinerCells) {
     Command command;
     const std::string told = virtual_wedges(command, "--scene opened --finer --count 8");
@@ -63,8 +63,8 @@ TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
-// Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is said to
-// lack something.
+// Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is
+// said to lack something.
 TEST(SlowVirtualWedges, WhatTheModelLacksIsSaid) {
     Command command;
     EXPECT_EQ(after(virtual_wedges(command, "--scene graded --count 4"), "lack of fit said: "), 4);

@@ -26,7 +26,8 @@ Curves load_record() {
     return load;
 }
 
-/// Pictures every 2 s of a camera whose clock starts `offset` s later on the load's and runs by `rate`, with noise on its channel.
+/// Pictures every 2 s of a camera whose clock starts `offset` s later on the load's and runs by `rate`, with noise on its
+/// channel.
 Curves camera_record(double offset, double rate, double noise) {
     std::mt19937 generator(3);
     std::normal_distribution<double> normal;

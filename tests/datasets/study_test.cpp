@@ -178,7 +178,8 @@ TEST(UnitStudy, ModelsToCompare) {
     EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").density, 333);
 }
 
-// A picture of 400 x 200 pixels of 50 um, turned by a quarter about its lower left corner at 12, 1 mm: up the picture is to the left.
+// A picture of 400 x 200 pixels of 50 um, turned by a quarter about its lower left corner at 12, 1 mm: up the picture is to the
+// left.
 TEST(UnitStudy, PhotographOfACrack) {
     const StudyFolder folder;
     const auto with = [](const std::string& photograph) {

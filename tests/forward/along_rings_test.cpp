@@ -13,8 +13,8 @@ namespace {
 constexpr double period = 2.2e-3, latewood_fraction = 0.25;  // of the rings; they lie level
 constexpr double half_height = 2.5 * period;                 // [m]
 
-// A strip between grips, five rings high, with a crack from the left this far above the lower border of the middle ring [m]; earlywood
-// below, latewood above (1 - 0.25) 2.2 mm. The crack's tip then goes on along a branch, if any.
+// A strip between grips, five rings high, with a crack from the left this far above the lower border of the middle ring [m];
+// earlywood below, latewood above (1 - 0.25) 2.2 mm. The crack's tip then goes on along a branch, if any.
 struct AlongRings {
     explicit AlongRings(double height, double cell = 0.1e-3) : run(scene(height, cell)) { EXPECT_TRUE(run.solved()); }
 

@@ -30,8 +30,8 @@ double release_rate(double here, double beyond, double distance, double cell, Pl
 }
 
 TEST(VerificationBoundary, GFallsTowardStifferWoodAsTheSingularitySays) {
-    // G ~ d^m, m from the exponents of Zak and Williams 1963 (REFERENCES: tip near a boundary; nu = 0.33), which hold for d much smaller
-    // than the crack: here a sixtieth to a fortieth of it.
+    // G ~ d^m, m from the exponents of Zak and Williams 1963 (REFERENCES: tip near a boundary; nu = 0.33), which hold for d much
+    // smaller than the crack: here a sixtieth to a fortieth of it.
     struct Exact {
         double ratio, stress, strain;
     };
@@ -48,8 +48,8 @@ TEST(VerificationBoundary, GFallsTowardStifferWoodAsTheSingularitySays) {
 }
 
 TEST(VerificationBoundary, GBesideABoundaryDoesNotDependOnTheGrid) {
-    // In front of softer wood the exponents' slope, -0.70, is reached only at 1e-4 of the crack's length: what is left of the difference
-    // goes with (d / a)^0.43. So the grid is held against one of cells half as wide.
+    // In front of softer wood the exponents' slope, -0.70, is reached only at 1e-4 of the crack's length: what is left of the
+    // difference goes with (d / a)^0.43. So the grid is held against one of cells half as wide.
     for (const bool stiffer : {true, false}) {
         double worst = 0.0;
         std::printf("G toward wood 30 times as %s, against cells half as wide:", stiffer ? "stiff" : "soft");

@@ -63,9 +63,9 @@ Scene two_halves(Vec2 from, Vec2 to, double widest) {
 }
 
 TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
-    // Equilibrium of two halves that stretch evenly: the stress is the law's at the opening that their stretch, stress height / E',
-    // leaves; on the way back it goes with the opening. Waves of the start, density times their speed times that of the drawing, are
-    // 0.4 % of the stress.
+    // Equilibrium of two halves that stretch evenly: the stress is the law's at the opening that their stretch, stress height /
+    // E', leaves; on the way back it goes with the opening. Waves of the start, density times their speed times that of the
+    // drawing, are 0.4 % of the stress.
     const double modulus = 400e6 / (1 - 0.33 * 0.33), height = 2e-3, width = 2e-3;
     const double waves = drawing_speed * std::sqrt(300.0 * modulus) / fibres.stress;
     for (const double y : {1e-3, 1.125e-3, 1.05e-3}) {  // on nodes, between them, and near them
@@ -98,7 +98,8 @@ TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
 }
 
 TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
-    // Drawn apart along the normal of the crack, both halves as a whole, faces carry the stress times their length, whatever the grid.
+    // Drawn apart along the normal of the crack, both halves as a whole, faces carry the stress times their length, whatever the
+    // grid.
     for (const double angle : {10.0, 30.0, 45.0, 70.0}) {
         const Vec2 along(std::cos(angle * degree), std::sin(angle * degree)), middle(1.03e-3, 0.96e-3);
         Scene scene = two_halves(middle - 4e-3 * along, middle + 4e-3 * along, 0.05e-3);
@@ -117,8 +118,9 @@ TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
     }
 }
 
-// A strip between grips that are drawn apart slowly, its notch on the left. Far behind the tip nothing is left, far ahead the strain is
-// even: G = C u^2 / h, C the modulus of wood that cannot contract aside, whatever the length of the crack (REFERENCES: strip).
+// A strip between grips that are drawn apart slowly, its notch on the left. Far behind the tip nothing is left, far ahead the
+// strain is even: G = C u^2 / h, C the modulus of wood that cannot contract aside, whatever the length of the crack (REFERENCES:
+// strip).
 Scene strip(double cell, double lift, double speed, std::optional<Bridging> law) {
     Scene scene = at_motion(block({16e-3, 4e-3}, cell));
     scene.edges = {moving("top", Side::top, {0.0, speed}), moving("bottom", Side::bottom, {0.0, -speed})};
@@ -135,8 +137,8 @@ Scene strip(double cell, double lift, double speed, std::optional<Bridging> law)
 }
 
 TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
-    // Rice (1968): of G far away a zone of bridges that are all broken at its far end takes the energy of the law. The zone is about 8
-    // cells long; wherever in a cell the tip lies, and the crack.
+    // Rice (1968): of G far away a zone of bridges that are all broken at its far end takes the energy of the law. The zone is
+    // about 8 cells long; wherever in a cell the tip lies, and the crack.
     const double u = 82e-6, speed = 0.1, half_height = 4e-3, cell = 0.2e-3;
     const double far = 40e6 * (1 - 0.33) / (1.33 * 0.34) * u * u / half_height;
     const Bridging law{0.5e6, 0.15e-3, true};
@@ -178,8 +180,8 @@ Growing growing(const Scene& scene) {
     return {constrained * end.displacement * end.displacement / 2e-3, sum / rows};
 }
 
-// Suo, Bao and Fan (1992): a crack whose zone has its full length grows at the toughness of the tip and the energy of the law. `most`:
-// how far it may be off as a part of that. The grid's own part in it shows without bridges.
+// Suo, Bao and Fan (1992): a crack whose zone has its full length grows at the toughness of the tip and the energy of the law.
+// `most`: how far it may be off as a part of that. The grid's own part in it shows without bridges.
 void check_growing(double cell, double lift, std::initializer_list<double> stresses, double most) {
     const Growing plain = growing(strip(cell, lift * cell, 0.02, std::nullopt));
     std::printf("cell %.2f mm, crack %.1f of one up: without bridges grows at %.1f of 100 J/m^2, J at the tip %.1f\n", 1e3 * cell,

@@ -251,8 +251,8 @@ TEST(VerificationWedgeStatics, HalvesOfAWedgePushNormalToTheFlanks) {
 }
 
 TEST(VerificationWedgeStatics, WheelsPushNormalToTheFlanks) {
-    // Asked: 1 %. The load is small, so that the flanks have hardly turned, and a wheel touches a fifth of a cell. The dent that a
-    // cell can show leans one way or the other with the place in the cell, by a thousandth: a steep flank turns that into up to
+    // Asked: 1 %. The load is small, so that the flanks have hardly turned, and a wheel touches a fifth of a cell. The dent that
+    // a cell can show leans one way or the other with the place in the cell, by a thousandth: a steep flank turns that into up to
     // 2.5 % of the ratio, which wavers about the exact one as the wheel rolls.
     const double cell = 0.1e-3;
     for (const double degrees : {10.0, 15.0, 20.0, 30.0}) {
@@ -283,8 +283,8 @@ double wedge_force(double cell) {
 }
 
 TEST(SlowVerificationWedgeForce, HardlyDependsOnTheGrid) {
-    // The wheels touch 0.2 mm of each flank, one to four cells, and what the wood gives way there is a tenth of the travel: that is
-    // what is left of the grid.
+    // The wheels touch 0.2 mm of each flank, one to four cells, and what the wood gives way there is a tenth of the travel: that
+    // is what is left of the grid.
     const double finest = wedge_force(0.05e-3);
     for (const double cell : {0.2e-3, 0.133e-3, 0.1e-3}) {
         const double force = wedge_force(cell);

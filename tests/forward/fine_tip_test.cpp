@@ -12,7 +12,8 @@
 namespace crampfit::test {
 namespace {
 
-// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the left.
+// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the
+// left.
 Scene two_woods(double boundary, double tip, double cell) {
     Scene scene = at_rest({4e-3, 4e-3}, cell);
     scene.specimen.material.clear();
@@ -38,8 +39,8 @@ MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numb
 }
 
 TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
-    // The reference is tests/forward/boundary_reference.py: finite elements of its own, good to 2e-4. The load that carries the crack
-    // across goes with the root of the least of these rates, so that 3 % are half of that in the load.
+    // The reference is tests/forward/boundary_reference.py: finite elements of its own, good to 2e-4. The load that carries the
+    // crack across goes with the root of the least of these rates, so that 3 % are half of that in the load.
     struct Reference {
         double boundary;
         std::array<double, 5> rate;
@@ -171,8 +172,8 @@ std::pair<double, double> crossing(double cell, bool extrapolate) {
     return {0.0, 0.0};
 }
 
-// The load that a crack needs is highest a part of an advance before latewood. Where stations lie must not matter to it: they begin with the
-// crack as it is given.
+// The load that a crack needs is highest a part of an advance before latewood. Where stations lie must not matter to it: they
+// begin with the crack as it is given.
 TEST(VerificationStations, PeakOfTheLoadIsFoundBetweenThem) {
     for (const double pith : {-20e-3, 30e-3}) {  // into latewood over its sharp side, either way
         double least = INFINITY, most = 0.0;

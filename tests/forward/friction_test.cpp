@@ -107,10 +107,10 @@ TEST(VerificationFreeBody, AForceGivesTheWayThatGaveTheForce) {
 }
 
 TEST(SlowVerificationFriction, PartialSlipOfAWheel) {
-    // Cattaneo (1938) and Mindlin (1949) for cylinders (Johnson 1985, eqs. 7.24 to 7.28): a wheel that is pressed by P and then pushed aside
-    // by Q slips from both edges in to c = a (1 - Q / (mu P))^1/2, and the traction that is left of Coulomb's is half an ellipse on c
-    // more: the integral of q x^2 is mu P / 4 (a^2 - c^4 / a^2). This holds where pressing shifts nothing aside, at nu = 1/2; at 0.45 it is
-    // a quarter of what it is at 0.33.
+    // Cattaneo (1938) and Mindlin (1949) for cylinders (Johnson 1985, eqs. 7.24 to 7.28): a wheel that is pressed by P and then
+    // pushed aside by Q slips from both edges in to c = a (1 - Q / (mu P))^1/2, and the traction that is left of Coulomb's is
+    // half an ellipse on c more: the integral of q x^2 is mu P / 4 (a^2 - c^4 / a^2). This holds where pressing shifts nothing
+    // aside, at nu = 1/2; at 0.45 it is a quarter of what it is at 0.33.
     const double nu = 0.45, size = 2.4e-3, cell = 0.03e-3, friction = 0.3, P = 1e3;
     Scene scene = hertz(friction, nu, cell, size);
     scene.bodies[0].velocity = {1e-3, 0.0};
@@ -191,8 +191,8 @@ TEST(VerificationWedgeFriction, ForcesLeanByTheFrictionAngle) {
 }
 
 TEST(VerificationCrackFriction, ClosedSlantedCrack) {
-    // Under pressure p and shear t a closed crack slides as if the shear were t - friction p (McClintock and Walsh 1962): K_II is that
-    // of this part alone, the rest of the stress is even.
+    // Under pressure p and shear t a closed crack slides as if the shear were t - friction p (McClintock and Walsh 1962): K_II is
+    // that of this part alone, the rest of the stress is even.
     const double a = 10e-3, pressure = 1e6, K0 = pressure * std::sqrt(std::numbers::pi * a);
     double worst = 0, worst_G = 0;
     for (const double friction : {0.0, 0.3}) {
@@ -315,8 +315,8 @@ void put_down(Scene& scene, bool crack, double friction) {
 }
 
 TEST(VerificationFrictionInMotion, ABlockSlidesAsCoulombSays) {
-    // Pushed by s and pressed by p it gains the momentum m_x = s L t - friction (p L t + m_y): what presses on the plate is p L less what
-    // lifts the block.
+    // Pushed by s and pressed by p it gains the momentum m_x = s L t - friction (p L t + m_y): what presses on the plate is p L
+    // less what lifts the block.
     const double pressure = 1e4, shear = 0.3e4, friction = 0.1, time = 1e-3, length = 20e-3;
     for (const bool crack : {false, true}) {
         Scene scene = pushed_block(shear, pressure);
@@ -377,7 +377,8 @@ TEST(VerificationFrictionInMotion, WheelsOnFlanksLeanByTheFrictionAngle) {
 }
 
 TEST(VerificationFriction, WorkIsStoredOrDissipated) {
-    // Wheels on the flanks of a notch roll 0.2 mm down: their work, by the trapezoid rule over the increments, against the potential.
+    // Wheels on the flanks of a notch roll 0.2 mm down: their work, by the trapezoid rule over the increments, against the
+    // potential.
     StaticTrial run(wedge(slope_two, 0.3, true), false);
     double work = 0, power = 0, worst = 0;
     const int steps = 32;
@@ -439,7 +440,8 @@ TEST(UnitFreeBody, IsRefusedWhereItCannotMove) {
 }
 
 TEST(VerificationFreeBody, AGripThatFollowsItsForceIsTheSameAsOneThatIsMoved) {
-    // Linear: a grip is moved aside and up, then only up with the force aside that this took; also with an edge that presses from the side.
+    // Linear: a grip is moved aside and up, then only up with the force aside that this took; also with an edge that presses from
+    // the side.
     Scene scene = at_rest({5e-3, 10e-3}, 0.5e-3);
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     Body grip = rough("grip", rectangle({-1e-3, 9e-3}, {6e-3, 11e-3}), {2e-5, 1e-4}, 0.0);

@@ -80,7 +80,8 @@ Scene cracked(const Vec2& start, const Vec2& tip) {
 }
 
 TEST(HardCondition, TheTangentHereIsTheSolvers) {
-    // Its quadratic form is twice the energy that the solver knows of, less that of the held sides: moved by the solver's own step.
+    // Its quadratic form is twice the energy that the solver knows of, less that of the held sides: moved by the solver's own
+    // step.
     const AtRest run(cracked({0.0, 10.3e-3}, {10.4e-3, 9.7e-3}));
     ASSERT_TRUE(run.solved());
     Scene still = run.scene;

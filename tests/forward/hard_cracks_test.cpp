@@ -61,7 +61,8 @@ TEST(HardTip, OnNodesLinesAndPointsAndAHairOff) {
 }
 
 TEST(HardField, OnePointBehindIt) {
-    // Of 400 places and turns of the crack, those whose smallest field has a single point, in the far corner of the node's support.
+    // Of 400 places and turns of the crack, those whose smallest field has a single point, in the far corner of the node's
+    // support.
     int found = 0;
     double worst = 0.0, least_share = 1.0;
     for (int k = 0; k < 400; ++k) {
@@ -119,8 +120,8 @@ TEST(HardCrackLine, AlongAGridLineAndAHairOff) {
     }
 }
 
-// A strip between grips with a crack at this height: whatever the height, G is what is stored far ahead (REFERENCES: strip), even where
-// the wood above the crack is another than that below.
+// A strip between grips with a crack at this height: whatever the height, G is what is stored far ahead (REFERENCES: strip), even
+// where the wood above the crack is another than that below.
 struct Strip {
     double height_of_crack = 5e-3;  // [m]
     double contrast = 1.0;          // E of the upper half over that of the lower
@@ -277,8 +278,8 @@ struct TwoCracks {
 };
 
 TEST(HardTwoCracks, NearlyMeeting) {
-    // Each 20 cells long. 2 % as long as the domain in which G is measured finds room between the tips. It shrinks to two cells, where
-    // it sees little but the tip's own cell: G is low by a sixth then, and of the grid only with one cell left.
+    // Each 20 cells long. 2 % as long as the domain in which G is measured finds room between the tips. It shrinks to two cells,
+    // where it sees little but the tip's own cell: G is low by a sixth then, and of the grid only with one cell left.
     const double h = 0.5e-3, length = 20 * h;
     for (const double gap : {12.0, 5.0, 4.0, 2.0, 1.0}) {
         const TwoCracks exact{0.5 * gap * h, 0.5 * gap * h + length};

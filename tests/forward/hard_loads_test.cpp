@@ -1,4 +1,5 @@
-// Hard cases of loading: wheels on corners and smaller than a cell, specimens that nothing holds, toughness out of all proportion.
+// Hard cases of loading: wheels on corners and smaller than a cell, specimens that nothing holds, toughness out of all
+// proportion.
 #include "datasets/error.hpp"
 #include "forward/simulate.hpp"
 #include "tests/forward/cracked_plates.hpp"
@@ -21,8 +22,8 @@ Vec2 push_of(const StaticTrial& run, int body) {
     return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
 }
 
-// Slope of the potential with time over the power of what prescribes motion, less one: they are the same at equilibrium. By central
-// differences over a hundredth of the travel.
+// Slope of the potential with time over the power of what prescribes motion, less one: they are the same at equilibrium. By
+// central differences over a hundredth of the travel.
 double slope_against_power(StaticTrial& run, double time) {
     double potential[2];
     for (const int side : {0, 1}) {
@@ -34,8 +35,8 @@ double slope_against_power(StaticTrial& run, double time) {
 }
 
 TEST(HardWheel, OnASharpCorner) {
-    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself, until
-    // the corner gives way to one side, at 0.62 mm on cells of 0.5 mm.
+    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself,
+    // until the corner gives way to one side, at 0.62 mm on cells of 0.5 mm.
     for (const double cell : {0.5e-3, 0.2e-3}) {
         const double radius = 1e-3;
         Scene scene = at_rest({10e-3, 10e-3}, cell);
@@ -53,7 +54,8 @@ TEST(HardWheel, OnASharpCorner) {
     }
 }
 
-// A V notch with flanks of slope 2 from 3 mm deep in 10 x 10 mm, two wheels on them 1 mm below the top, which go down by 1 mm a second.
+// A V notch with flanks of slope 2 from 3 mm deep in 10 x 10 mm, two wheels on them 1 mm below the top, which go down by 1 mm a
+// second.
 Scene notched(double radius, double cell) {
     const double half = std::atan(0.5), deep = 3e-3;
     Scene scene = at_rest({10e-3, 10e-3}, cell);

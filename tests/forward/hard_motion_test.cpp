@@ -187,8 +187,9 @@ TEST(HardImpact, AtTwentyMetresASecond) {
 }
 
 TEST(HardContrast, WaveComesOutOfWoodAThousandTimesStiffer) {
-    // A plane wave in latewood meets earlywood a thousandth as stiff, which then moves at 2 Z / (Z + Z_earlywood) times the speed of the
-    // wood behind the wave, Z = rho c (Graff 1975, chapter 2). The rings' pith is so far away that the boundary is straight.
+    // A plane wave in latewood meets earlywood a thousandth as stiff, which then moves at 2 Z / (Z + Z_earlywood) times the speed
+    // of the wood behind the wave, Z = rho c (Graff 1975, chapter 2). The rings' pith is so far away that the boundary is
+    // straight.
     const double length = 50e-3, v = 1.0;
     Scene scene = block({length, 1e-3}, 0.25e-3);
     scene.specimen.material.clear();

@@ -81,8 +81,8 @@ TEST(VerificationHistory, RelaxationOfABar) {
 
 double creep(double share, double tau, double time) { return 1 + share / (1 - share) * -std::expm1(-(1 - share) * time / tau); }
 
-// Under a load from the start on: u = sigma L / E' (1 + g / (1 - g) (1 - exp(-(1 - g) t / tau))), and the error goes with the square of
-// the step.
+// Under a load from the start on: u = sigma L / E' (1 + g / (1 - g) (1 - exp(-(1 - g) t / tau))), and the error goes with the
+// square of the step.
 TEST(VerificationHistory, CreepOfABar) {
     const double share = 0.6, tau = 0.7, stress = 0.1e6;
     for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
@@ -147,8 +147,8 @@ TEST(VerificationHistory, RelaxationAndCreepInMotion) {
     }
 }
 
-// A wheel that follows a force sinks as it would into elastic wood of E over the creep function, as long as what it touches grows (Lee and
-// Radok 1960; Poisson's ratio stays what it is).
+// A wheel that follows a force sinks as it would into elastic wood of E over the creep function, as long as what it touches grows
+// (Lee and Radok 1960; Poisson's ratio stays what it is).
 TEST(VerificationHistory, WheelSinksIn) {
     const double share = 0.6, tau = 0.7;
     std::array<double, 2> worst{};
@@ -177,12 +177,14 @@ TEST(VerificationHistory, WheelSinksIn) {
         }
     }
     std::printf("wheel: depth off by %.1e, with cells half as wide by %.1e\n", worst[0], worst[1]);
-    // Springs on the outline are as stiff as the wood at once, and those of the softer wood softer: their depth goes with the cell.
+    // Springs on the outline are as stiff as the wood at once, and those of the softer wood softer: their depth goes with the
+    // cell.
     EXPECT_LT(worst[0], 0.01);
     EXPECT_LT(worst[1], 0.6 * worst[0]);
 }
 
-// Free vibration dies out as s of rho s^2 + k^2 E'(s) = 0 has it, E'(s) = E' (1 - g / (1 + s tau)): loss angle and stiffness in one.
+// Free vibration dies out as s of rho s^2 + k^2 E'(s) = 0 has it, E'(s) = E' (1 - g / (1 + s tau)): loss angle and stiffness in
+// one.
 TEST(VerificationHistory, VibrationDiesOut) {
     const double share = 0.1, L = 25e-3;
     const double M = 40e6 * 0.67 / (1.33 * 0.34), k = pi / (2 * L);  // sides on rollers: plane waves
@@ -199,8 +201,8 @@ TEST(VerificationHistory, VibrationDiesOut) {
         s = std::sqrt(-omega * omega * (1.0 - share / (1.0 + s * tau)));
         if (s.imag() < 0) s = -s;
     }
-    // As the mode itself goes, the springs of the Maxwell elements would have to start strained; from rest they follow in tau, so that
-    // amplitude and phase are compared over later periods.
+    // As the mode itself goes, the springs of the Maxwell elements would have to start strained; from rest they follow in tau, so
+    // that amplitude and phase are compared over later periods.
     Trial run(scene);
     const double v0 = 1e-3;
     run.solver.start([](const Vec2&) { return Vec2::Zero(); },
@@ -417,7 +419,8 @@ TEST(GradientHistory, TangentAndTurningOfCells) {
         }
 }
 
-// Layers that all flow at the same shear stress, without hardening, slide along their boundary: any way to share the slip is as good.
+// Layers that all flow at the same shear stress, without hardening, slide along their boundary: any way to share the slip is as
+// good.
 TEST(UnitHistory, LayersMayAllFlow) {
     Scene scene = ring_specimen(3e-3, 0.8e-3);
     scene.materials["EW"] = flowing(0.4e6, 0.0);
@@ -465,8 +468,9 @@ TEST(UnitHistory, LayersAreElasticAtOnce) {
     EXPECT_LT(remembering, body.layout.cells());
 }
 
-// Of perfectly plastic wood between rough platens, no wider than high, the limit is the same (Hill 1950, ch. 9): it is reached only where
-// points may flow without a change of volume, and else the load rises without end. The platens' corners leave an error of first order.
+// Of perfectly plastic wood between rough platens, no wider than high, the limit is the same (Hill 1950, ch. 9): it is reached
+// only where points may flow without a change of volume, and else the load rises without end. The platens' corners leave an error
+// of first order.
 TEST(VerificationHistory, RoughBlockComesToItsLimit) {
     for (const double cell : {0.5e-3, 0.25e-3}) {
         Scene scene = at_rest({4e-3, 4e-3}, cell);
@@ -488,8 +492,8 @@ TEST(VerificationHistory, RoughBlockComesToItsLimit) {
     }
 }
 
-// A cantilever of perfectly plastic wood comes to its plastic moment Y h^2 / 4 (2 / sqrt(3) of it in plane strain) at the grip, which
-// keeps the wood beside it from flowing, so that the hinge lies some part of the height away from it.
+// A cantilever of perfectly plastic wood comes to its plastic moment Y h^2 / 4 (2 / sqrt(3) of it in plane strain) at the grip,
+// which keeps the wood beside it from flowing, so that the hinge lies some part of the height away from it.
 TEST(VerificationHistory, CantileverComesToItsPlasticMoment) {
     const double L = 40e-3, h = 4e-3, Y = 0.4e6;
     for (const PlaneCondition plane : {PlaneCondition::stress, PlaneCondition::strain}) {
@@ -533,8 +537,8 @@ TEST(VerificationHistory, ComesToElasticWood) {
     }
 }
 
-// Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in elastic
-// wood, and the books close. Where nothing relaxes it is elastic wood.
+// Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in
+// elastic wood, and the books close. Where nothing relaxes it is elastic wood.
 TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
     Scene scene = block({10e-3, 10e-3}, 0.4e-3);
     scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
@@ -634,7 +638,8 @@ TEST(UnitHistory, Refusals) {
     refuses(other, "stop");
 }
 
-// Steps begin with a twentieth of the relaxation time wherever the load changes, and come to what stops, to frames and to the end.
+// Steps begin with a twentieth of the relaxation time wherever the load changes, and come to what stops, to frames and to the
+// end.
 TEST(UnitMarch, Times) {
     Scene scene = bar(relaxing(0.5, 0.01), PlaneCondition::strain, pull(1e-6, 0.3));
     scene.output.frames = 3;

@@ -16,8 +16,8 @@ struct LaminatedStrip {
     double start = 10e-3;    // crack length before the ring that it crosses, whole rings [m]
 };
 
-/// What a crack gives off over one whole ring, over the energy that was stored in a ring far ahead, less one: by the change of the
-/// potential, by G at each half cell, and by K.
+/// What a crack gives off over one whole ring, over the energy that was stored in a ring far ahead, less one: by the change of
+/// the potential, by G at each half cell, and by K.
 struct RingMeans {
     double potential, G, K;
 };

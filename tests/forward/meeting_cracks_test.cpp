@@ -1,4 +1,5 @@
-// Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were alone.
+// Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were
+// alone.
 #include "forward/cracks.hpp"
 #include "forward/simulate.hpp"
 #include "tests/forward/cracked_plates.hpp"

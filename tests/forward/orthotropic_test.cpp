@@ -68,7 +68,8 @@ TEST(UnitElasticity, EqualConstantsAllWaysAreIsotropic) {
     }
 }
 
-// Worst difference between the slope by a constant and central differences of 1e-5 of it (error of the differences 1e-10), over the slope.
+// Worst difference between the slope by a constant and central differences of 1e-5 of it (error of the differences 1e-10), over
+// the slope.
 template <class Change>
 double slope_error(const Material& material, PlaneCondition plane, ElasticConstant constant, double value, Change change) {
     const double step = 1e-5 * value;
@@ -184,7 +185,8 @@ TEST(VerificationOrthotropicPatch, StressOutOfThePlane) {
 
 // --- Cracks
 
-// Lekhnitskii's roots in the axes of a crack that lies `turn` counter-clockwise from R (roots turned as in Lekhnitskii 1963, sec. 7).
+// Lekhnitskii's roots in the axes of a crack that lies `turn` counter-clockwise from R (roots turned as in Lekhnitskii 1963, sec.
+// 7).
 std::array<std::complex<double>, 2> lekhnitskii_roots(const Eigen::Matrix3d& a, double turn) {
     using Complex = std::complex<double>;
     const double half = (2 * a(0, 1) + a(2, 2)) / (2 * a(0, 0)), last = a(1, 1) / a(0, 0);
@@ -198,8 +200,8 @@ std::array<std::complex<double>, 2> lekhnitskii_roots(const Eigen::Matrix3d& a, 
     return roots;
 }
 
-// Stress around a crack from -a to a on the x axis of an infinite anisotropic plate (Sih, Paris and Irwin 1965): that of the near-tip
-// field with z / (z^2 - a^2)^1/2 in place of (a / 2 z)^1/2, and the stress along the crack that is missing far away.
+// Stress around a crack from -a to a on the x axis of an infinite anisotropic plate (Sih, Paris and Irwin 1965): that of the
+// near-tip field with z / (z^2 - a^2)^1/2 in place of (a / 2 z)^1/2, and the stress along the crack that is missing far away.
 struct AnisotropicGriffith {
     std::array<std::complex<double>, 2> roots;
 
@@ -246,9 +248,9 @@ Scene cracked_wood(const CrackedWood& c) {
 }
 
 TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
-    // Sih, Paris and Irwin 1965: K_I = s_n (pi a)^1/2, K_II = t (pi a)^1/2 whatever the wood, where the faces carry no resultant. Along
-    // an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2. Bars as for isotropic wood, on twice as many
-    // cells: shear as soft as this makes the near-tip field as much steeper.
+    // Sih, Paris and Irwin 1965: K_I = s_n (pi a)^1/2, K_II = t (pi a)^1/2 whatever the wood, where the faces carry no resultant.
+    // Along an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2. Bars as for isotropic wood, on
+    // twice as many cells: shear as soft as this makes the near-tip field as much steeper.
     const double stress = 1e5, a = 10e-3, K0 = stress * std::sqrt(std::numbers::pi * a);
     const Eigen::Matrix3d b = plane_compliance(wood(), PlaneCondition::strain);
     const auto sih = [&](double b11, double b22) {
@@ -285,8 +287,8 @@ TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
 }
 
 TEST(VerificationOrthotropicCrack, GIsTheLossOfPotentialPerCrackLength) {
-    // -dPi / da by central differences, tractions on the sides held. Over five cells either way, as the tip of a crack oblique to the
-    // grid lies exact to a tenth of a cell.
+    // -dPi / da by central differences, tractions on the sides held. Over five cells either way, as the tip of a crack oblique to
+    // the grid lies exact to a tenth of a cell.
     for (const auto& [crack, grain] : {std::pair{0.0, 40.0}, {30.0, 0.0}, {30.0, 75.0}}) {
         CrackedWood c;
         c.crack = crack * degree;

@@ -51,7 +51,8 @@ double force_at_displacement(const Record& record, double displacement) {
 // ---- the highest load between two places
 
 TEST(UnitLoadPeak, IsExactWhereTheEnergyIsACubic) {
-    // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2 there.
+    // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2
+    // there.
     const auto needed = [](double x) -> NeededLoad {
         const double d = x - 0.3;
         return {x, std::sqrt(8.0 / (2.0 + d * d + 0.5 * d * d * d)), 8.0};
@@ -313,8 +314,8 @@ TEST(UnitWalk, StopsAreMetExactly) {
 }
 
 TEST(UnitWalk, ACrackLengthAloneStopsIt) {
-    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; one by grips, which is
-    // not linear since nothing says beforehand how far they will go, is refused.
+    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; one by grips, which
+    // is not linear since nothing says beforehand how far they will go, is refused.
     for (const bool grips : {false, true}) {
         Scene bounded = rings_walk();
         bounded.materials["LW"].toughness = 100.0;

@@ -133,8 +133,9 @@ double force_at(const Record& record, double displacement, bool after) {
 }
 
 TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
-    // At the very displacement of a jump a number that delays it tells the slope of the force before the jump, one that hastens it the
-    // slope after it: the first by one-sided differences of the walk, the second by those of whole runs, (4 f(s) - f(2 s) - 3 f(0)) / 2 s.
+    // At the very displacement of a jump a number that delays it tells the slope of the force before the jump, one that hastens
+    // it the slope after it: the first by one-sided differences of the walk, the second by those of whole runs, (4 f(s) - f(2 s)
+    // - 3 f(0)) / 2 s.
     for (const double advance : {0.8e-3, 0.0}) {
         Scene scene = across_rings(0.4e-3);
         scene.cracks[0].advance = advance;

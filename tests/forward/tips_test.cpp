@@ -143,7 +143,8 @@ TEST(UnitBranch, StartsAsCotterellAndRiceSay) {
     }
 }
 
-// The way in which a tip in the middle of a 10 mm block turns, in degrees; `side` sets the toughness above the tip over that below.
+// The way in which a tip in the middle of a 10 mm block turns, in degrees; `side` sets the toughness above the tip over that
+// below.
 double turn(GrowthDirection criterion, double K_I, double K_II, double side = 1.0, Vec2 ahead = {1.0, 0.0}) {
     Scene scene = block({10e-3, 10e-3}, 1e-3);
     if (side != 1.0) {

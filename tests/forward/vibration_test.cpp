@@ -73,7 +73,8 @@ struct Vibration {
     double amplitude;  // of the end [m]
 };
 
-/// Biot strain's stress is linear in the stretch, so that the exact solution holds at any amplitude: v = v0 sin(pi X / 2 L) cos(w t).
+/// Biot strain's stress is linear in the stretch, so that the exact solution holds at any amplitude: v = v0 sin(pi X / 2 L) cos(w
+/// t).
 Vibration vibrate(const Way& way, double v0, int periods) {
     FreeRun run(way.of(bar()), true);
     run.solver.start([](const Vec2&) { return Vec2::Zero(); },
@@ -138,8 +139,9 @@ TEST(VerificationBar, VibratingOverManyCells) {
 }
 
 TEST(VerificationBar, EachUpdate) {
-    // Lumped mass lowers frequencies by (k h)^2 / 24 with hats, (k h)^2 / 8 with B-splines; what points hand back, A = 1 - 13/96 (k h)^2
-    // with hats and two points a cell, adds half of that with FLIP and XPIC; FMPM's extrapolation takes that back from m = 2 on.
+    // Lumped mass lowers frequencies by (k h)^2 / 24 with hats, (k h)^2 / 8 with B-splines; what points hand back, A = 1 - 13/96
+    // (k h)^2 with hats and two points a cell, adds half of that with FLIP and XPIC; FMPM's extrapolation takes that back from m
+    // = 2 on.
     const double kh = pi / 100;
     std::printf("bar of 50 cells, 5 periods\n");
     const Way ways[] = {
@@ -174,8 +176,9 @@ TEST(VerificationBar, EachUpdate) {
     EXPECT_LT(std::abs(found["fmpm(4)"].drift), 1e-7);
 }
 
-// ---- A standing wave along both axes in a unit square on rollers: u_i = A sin(2 pi X_i) cos(w t), w = 2 pi c, c^2 = C_xx / rho. An axis
-// is not felt by the other, as du_x/dX depends on X alone: exact at any amplitude with Biot's strain (no rotation), without body forces.
+// ---- A standing wave along both axes in a unit square on rollers: u_i = A sin(2 pi X_i) cos(w t), w = 2 pi c, c^2 = C_xx / rho.
+// An axis is not felt by the other, as du_x/dX depends on X alone: exact at any amplitude with Biot's strain (no rotation),
+// without body forces.
 
 double wave_error(const Way& way, int cells) {
     constexpr double A = 0.05, E = 1.0, nu = 0.3;
@@ -221,8 +224,8 @@ TEST(VerificationStandingWave, ConvergesWithTheSecondOrder) {
     }
 }
 
-// ---- REFERENCES: two-disk impact. Published without what surrounds them; here 20 mm across, 25 mm between centres, head on, each at half
-// of 1 % of the wave speed, plane strain.
+// ---- REFERENCES: two-disk impact. Published without what surrounds them; here 20 mm across, 25 mm between centres, head on,
+// each at half of 1 % of the wave speed, plane strain.
 
 Scene two_disks() {
     Scene scene = block({50e-3, 24e-3}, 0.5e-3);
@@ -259,7 +262,8 @@ TEST(SlowDisks, LoseLittleWhenVelocitiesGoThroughThePoints) {
     expect_bounce({{"flip", ShapeFunction::automatic, VelocityUpdate::flip},
                    {"fmpm(4)", ShapeFunction::automatic, VelocityUpdate::fmpm, 4}},
                   0.0186);
-    // A filter that takes (1 - A)^2 of the velocities each of 4000 steps misses the bar for the best published, as FLIP there does (3.23 %).
+    // A filter that takes (1 - A)^2 of the velocities each of 4000 steps misses the bar for the best published, as FLIP there
+    // does (3.23 %).
     expect_bounce({{"xpic(2)", ShapeFunction::automatic, VelocityUpdate::xpic, 2}}, 0.0323);
 }
 

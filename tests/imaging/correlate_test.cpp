@@ -61,8 +61,9 @@ Errors compare(const PointLattice& lattice, const DisplacementField& field, cons
     return errors;
 }
 
-/// The least standard error of a subset's displacement (root mean square over u, v and the points), from the slopes of a picture without
-/// noise: gray's offset, its gain and the warp are unknown, and both pictures have the noise of their pixels and of rounding [px].
+/// The least standard error of a subset's displacement (root mean square over u, v and the points), from the slopes of a picture
+/// without noise: gray's offset, its gain and the warp are unknown, and both pictures have the noise of their pixels and of
+/// rounding [px].
 double cramer_rao(const FinePicture& clean, const PointLattice& lattice, int subset, int order, double noise) {
     const SplinePicture::Slopes slopes = SplinePicture(clean).slopes();
     const int half = subset / 2, terms = order == 1 ? 3 : 6;

@@ -70,8 +70,8 @@ void expect_tips(const std::vector<Case>& cases) {
 
 }  // namespace
 
-// Bars: a few pixels, unbiased. Where the crack is 0.8 px wide at 100 px behind its tip, the last 15 px are less than 0.3 px wide: there the
-// bar is that.
+// Bars: a few pixels, unbiased. Where the crack is 0.8 px wide at 100 px behind its tip, the last 15 px are less than 0.3 px
+// wide: there the bar is that.
 TEST(VerificationGrayTrack, TipsOfCracksInWood) {
     expect_tips({{"across rings", 0, 3, 60, {-2000, 200}, 5, 2}, {"across, hardly open", 0, 0.8, 60, {-2000, 200}, 15, 5}});
 }
@@ -84,8 +84,9 @@ TEST(SlowGrayTrack, TipsOfMoreCracksInWood) {
                  {"from above", 1.57, 2, 50, {-2000, 200}, 5, 2}});
 }
 
-// A specimen that has come apart: its lower part is held, the upper one has moved by 10 px. The way is where the wood parted, not in the middle
-// of the gap, which lies 5 px above; nor along a ring that the motion darkens. Bar: a few pixels, as for tips; 10 px from the picture's sides.
+// A specimen that has come apart: its lower part is held, the upper one has moved by 10 px. The way is where the wood parted, not
+// in the middle of the gap, which lies 5 px above; nor along a ring that the motion darkens. Bar: a few pixels, as for tips; 10
+// px from the picture's sides.
 TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     const WoodCamera camera(end_grain_picture(columns, rows, 90, {-600, -900}, 3), 10);
     const GrayTracker tracker(camera.take({}), {});
@@ -110,8 +111,8 @@ TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     EXPECT_LT(worst, 5);
 }
 
-// A specimen before a dark ground, black or gray, which shows through the crack: it begins at the specimen's edge, and ends there when both
-// halves have parted over the ground.
+// A specimen before a dark ground, black or gray, which shows through the crack: it begins at the specimen's edge, and ends there
+// when both halves have parted over the ground.
 TEST(VerificationGrayTrack, CrackOfASpecimenOnADarkGround) {
     constexpr int margin = 40;
     const cv::Mat wood = end_grain_picture(columns, rows, 60, {-2000, 200}, 3);

@@ -83,7 +83,8 @@ TEST(UnitPhotograph, RefusesWhatDoesNotFit) {
     EXPECT_TRUE(none.picture.gray.empty());
 }
 
-// A spline through samples of a plane is that plane: gray at any place is exact, but for the rounding of float and the picture's ends.
+// A spline through samples of a plane is that plane: gray at any place is exact, but for the rounding of float and the picture's
+// ends.
 TEST(UnitWoodSurface, GrayOfTheWoodAtItsPlace) {
     FinePicture picture{80, 60, {}};
     for (int y = 0; y < 60; ++y)

@@ -101,8 +101,8 @@ TEST(UnitSegment, DirectionFromASecondPicture) {
     EXPECT_THROW(segment(folder / "a.png", {.direction = folder / "c.png"}), InputError);
 }
 
-// Rings about a known pith outside the picture and in it, under noise of 5 %, a wide crack and a knot of noise across them; and straight ones. Bar of
-// the directions: mean error 1 degree.
+// Rings about a known pith outside the picture and in it, under noise of 5 %, a wide crack and a knot of noise across them; and
+// straight ones. Bar of the directions: mean error 1 degree.
 TEST(VerificationSegment, DirectionsFromAFittedPith) {
     for (const Vec2& pith : {Vec2(-250, 420), Vec2(200, 130), Vec2(-1e6, 150)}) {
         cv::Mat pixels(300, 400, CV_32F), grain(pixels.size(), CV_32F);

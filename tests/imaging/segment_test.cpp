@@ -81,8 +81,8 @@ bool near_a_border(const Eigen::Vector2d& vertex, const EndGrain& grown) {
     });
 }
 
-/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a border may end
-/// up to 6 pixels before.
+/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a
+/// border may end up to 6 pixels before.
 Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
     Misses misses;
     for (const RingBorder& border : grown.borders) {
@@ -254,9 +254,9 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
     }
 }
 
-// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; the direction of wavy ones is
-// known: r + a sin(k theta r0) is constant along a ring. The others run askew and wave by 6 and 15 degrees, under noise of 5 %. Bars
-// of the borders and of the orientation as above.
+// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; the
+// direction of wavy ones is known: r + a sin(k theta r0) is constant along a ring. The others run askew and wave by 6 and 15
+// degrees, under noise of 5 %. Bars of the borders and of the orientation as above.
 TEST(VerificationSegment, WavyRings) {
     const struct {
         const char* name;
@@ -311,9 +311,9 @@ TEST(VerificationSegment, WavyRings) {
     }
 }
 
-// Rings whose EW darkens from its very beginning and whose LW does to its very end, blurred, waving, under noise of 5 % and uneven light. LW is what
-// lies beyond half of a ring's range (the half-range rule) in the wood, not in its blurred picture. Bars of the LW fraction and of the classes
-// as above.
+// Rings whose EW darkens from its very beginning and whose LW does to its very end, blurred, waving, under noise of 5 % and
+// uneven light. LW is what lies beyond half of a ring's range (the half-range rule) in the wood, not in its blurred picture. Bars
+// of the LW fraction and of the classes as above.
 TEST(VerificationSegment, RingsWithoutAPlateau) {
     const struct {
         const char* name;

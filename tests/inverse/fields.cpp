@@ -110,8 +110,8 @@ void expect_moduli(const Fit& found, const char* what) {
     std::printf("%s\n%s\n", found.method.c_str(), found.message.c_str());
 }
 
-// The bar of the issue: both moduli within 3 %, the truth within the 95 % intervals. The test is made on a grid of half the cell, so
-// that the model's own error takes part.
+// The bar of the issue: both moduli within 3 %, the truth within the 95 % intervals. The test is made on a grid of half the cell,
+// so that the model's own error takes part.
 TEST(VerificationFields, ModuliOfBothWoodsComeOutOfOneTensileField) {
     const Experiment measured = measure(strip(0.1e-3), lattice_of_subsets(), 0.01, 1);
     expect_moduli(fit(study_of(measured, 0.2e-3)), "fixed to the picture, camera free");

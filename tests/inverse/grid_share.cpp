@@ -30,8 +30,8 @@ Scene walked(bool extrapolates) {
     return scene;
 }
 
-// Where cells twice as wide answer at the best point as this grid does so far off, their fit lies as far off on the other side, and as much is
-// left on this one: of a plain grid all of it, of two that have been extrapolated three quarters.
+// Where cells twice as wide answer at the best point as this grid does so far off, their fit lies as far off on the other side,
+// and as much is left on this one: of a plain grid all of it, of two that have been extrapolated three quarters.
 TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
     const Eigen::Vector2d off(-0.01, 0.004);
     for (const bool extrapolates : {false, true}) {

@@ -77,7 +77,8 @@ Parameter of_machine(const char* key, double lower, double upper) {
     return parameter;
 }
 
-// Toughnesses and everything about the machine from one test without noise, and a run of the scene for each pair of toughnesses only.
+// Toughnesses and everything about the machine from one test without noise, and a run of the scene for each pair of toughnesses
+// only.
 TEST(SystemMachine, FoundBesideToughnessWithoutFurtherRuns) {
     FakeWedge wedge;
     wedge.sharpness = 1;

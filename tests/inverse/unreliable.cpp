@@ -1,5 +1,5 @@
-// A solver of whose runs one in five fails and one in twenty hangs, at points drawn at random: fits come to the same optimum as with one
-// that never does, and sensitivity studies to the same indices.
+// A solver of whose runs one in five fails and one in twenty hangs, at points drawn at random: fits come to the same optimum as
+// with one that never does, and sensitivity studies to the same indices.
 #include "inverse/fit.hpp"
 #include "inverse/sensitivity.hpp"
 #include "tests/inverse/fake_wedge.hpp"
@@ -50,8 +50,8 @@ struct Losses {
 
 class Unreliable : public ::testing::TestWithParam<const char*> {};
 
-// The lowest misfit is that of a simplex with time enough. Methods that step by differences end a part of a standard error from it where no run
-// fails too.
+// The lowest misfit is that of a simplex with time enough. Methods that step by differences end a part of a standard error from
+// it where no run fails too.
 TEST_P(Unreliable, FitsComeToTheSameOptimum) {
     Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
     study.optimizer = {.method = "sbplx", .starts = 4, .max_runs = 2000};

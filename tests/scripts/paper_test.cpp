@@ -166,7 +166,8 @@ TEST(SlowPaper, TrPlusForceRisesAndFallsAtLatewood) {
     }
 }
 
-// Boxes about the tip once took more energy off, along bands that lie askew, than an advance releases: the crack stopped for good.
+// Boxes about the tip once took more energy off, along bands that lie askew, than an advance releases: the crack stopped for
+// good.
 TEST(SlowPaper, TrMinusGoesThroughAtEquilibrium) {
     double peak[2];
     for (const int fine : {0, 1}) {
@@ -208,9 +209,10 @@ TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
     }
 }
 
-// The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness latewood
-// turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no more of its way in
-// latewood than the straight way on does, over which the waving band leans. At equilibrium one that starts in latewood does not leave it.
+// The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness
+// latewood turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no
+// more of its way in latewood than the straight way on does, over which the waving band leans. At equilibrium one that starts in
+// latewood does not leave it.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const Trip from_earlywood = run("tension_rt", speed, 0.1);
