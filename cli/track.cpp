@@ -24,8 +24,8 @@ struct Arguments {
     std::string from = "auto";  // auto, fields or gray
 };
 
-constexpr double well_known =
-    0.2;  // of a subset: a tip whose place displacements tell no better is looked for as a dark line, too
+// Of a subset: a tip whose place displacements tell no better is looked for as a dark line, too.
+constexpr double well_known = 0.2;
 
 /// The tip by the displacement field, by the picture's gray, or by the gray where the field does not show it well.
 class TipFinder {

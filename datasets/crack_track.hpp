@@ -35,8 +35,8 @@ struct CrackTip {
     double angle = unknown;      // in which the crack points, clockwise as seen, from +x [rad]
     double length = unknown;     // from where the crack's line enters the picture to the tip [px]
     double sigma = unknown;      // standard error of the length [px]
-    std::vector<Vec2> way =
-        {};  // of the crack from its mouth to the tip, or through the picture, where it was followed; else it is straight [px]
+    // Of the crack from its mouth to the tip, or through the picture, where it was followed; else it is straight [px].
+    std::vector<Vec2> way = {};
 };
 
 /// How the images' clock was set by the load's: load time = offset + rate * image time.

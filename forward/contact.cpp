@@ -21,14 +21,14 @@ constexpr double stiffness_in_cells = 10.0;
 // cells 4.6 %. Chosen by that, as is where the mean ends.
 constexpr double width_in_cells = 1.0;
 constexpr double width_in_radii = 0.2;
-constexpr double most_radius_in_cells =
-    16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
+// Beyond it the grid's bends are small, and contact so wide that its tangent is dear.
+constexpr double most_radius_in_cells = 16.0;
 
 // Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a
 // touch coming; from there on it grows evenly.
 constexpr double onset_in_cells = 0.0003;
-constexpr double at_touch =
-    0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
+// Part of the stiffness that is there from the first touch, so that a body at rest on it is held.
+constexpr double at_touch = 0.1;
 
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {

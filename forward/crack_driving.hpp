@@ -14,8 +14,8 @@ struct LoadState {
     double potential = 0;      // Pi: energy of the specimen less the work of tractions, and what friction has dissipated [J]
     double power = 0;          // dPi/dt while the crack stands: of what prescribes motion [W]
     double traction_work = 0;  // of tractions and forces on bodies since there was no load [J]
-    double end_potential =
-        0;  // both again as the end of an advance, to be compared with its start: what the grid misses at tips near
+    // Both again as the end of an advance, to be compared with its start: what the grid misses at tips near.
+    double end_potential = 0;
     double end_power = 0;     // sharp boundaries is that of the boxes that stand about the tips of the start (`FineTip`) [J], [W]
     double dissipated = 0;    // by friction [J]
     double displacement = 0;  // of the measured edge or body [m]

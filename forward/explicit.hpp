@@ -27,7 +27,7 @@ struct EnergyBooks {
     double contact = 0;   // in the springs of sliding contact
     double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip
                           // back; and bridged faces
-    double damped = 0;  // by drag, by friction and impact of contacts, and in wood that remembers
+    double damped = 0;    // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind

@@ -268,8 +268,8 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
 
 // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
 int MaterialMap::samples_a_side(const Vec2& half) const {
-    constexpr double rounding =
-        1e-6;  // one more sample than twice a whole number of pixels would put some of them on the edges of pixels
+    // One more sample than twice a whole number of pixels would put some of them on the edges of pixels.
+    constexpr double rounding = 1e-6;
     const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_ - rounding)) : 16;
     return std::clamp(fit, 2, 16);
 }

@@ -17,8 +17,8 @@ constexpr double edge = 3;           // rows at the end of what is photographed 
 
 /// The way through `gain` [band x columns] that gathers most, moving at most one row a column and paying for each.
 std::vector<int> best_way(const cv::Mat& gain) {
-    constexpr float price =
-        3;  // of a row, against 1 for each column on the border: no stain is worth a turn, straightened rings hardly wave
+    // Of a row, against 1 for each column on the border: no stain is worth a turn, straightened rings hardly wave.
+    constexpr float price = 3;
     cv::Mat sum = gain.clone(), from = cv::Mat::zeros(gain.size(), CV_8S);
     for (int u = 1; u < gain.cols; ++u) {
         for (int j = 0; j < gain.rows; ++j) {

@@ -21,9 +21,9 @@ struct SegmentOptions {
     std::vector<GrayClass> gray = {};  // classes by the picture's own gray; empty: by each ring's; grays in no range are void
     std::optional<DensityTable> density = std::nullopt;  // what the picture's own gray stands for
     int threads = 0;                                     // of OpenCV in this process; 0: as they are
-    std::filesystem::path direction =
-        {};                 // picture of the same wood, as large, that the radial direction is seen in; empty: the same
-    bool fit_pith = false;  // radial directions away from the place that they fit best
+    // Picture of the same wood, as large, that the radial direction is seen in; empty: the same.
+    std::filesystem::path direction = {};
+    bool fit_pith = false;                    // radial directions away from the place that they fit best
     std::optional<Vec2> pith = std::nullopt;  // or away from here [pixels]
 
     /// Throws InputError for anything out of range.

@@ -20,8 +20,8 @@ struct VirtualCameraOptions {
     double noise = 1;          // standard deviation of each pixel's gray, anew in each picture
     double gap_gray = 10;      // where a crack lets one see through
     double blur = 0;           // of the lens, standard deviation of a Gaussian [px]
-    int samples =
-        1;  // a side of the square that a pixel's gray is the mean of; a narrow gap darkens a pixel by its share only with some
+    // A side of the square that a pixel's gray is the mean of; a narrow gap darkens a pixel by its share only with some.
+    int samples = 1;
     std::uint64_t seed = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.

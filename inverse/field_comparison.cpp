@@ -84,8 +84,8 @@ std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, co
 
 void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share,
                                        std::vector<Vec2>& values) const {
-    Eigen::MatrixXd normal =
-        Eigen::MatrixXd::Zero(3, 3);  // of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end
+    // Of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end.
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(3, 3);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(3);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto rows = motion_at(places_[points[i].place] / reach_);

@@ -215,8 +215,8 @@ TEST(HardContrast, LayersInARowWhereverTheyLieInTheCells) {
             const AtRest run(scene);
             ASSERT_TRUE(run.solved());
             const double M = 40e6 * 0.67 / (1.33 * 0.34);
-            const double exact =
-                pull / (height * (0.75 / M + 0.25 / (contrast * M))) * 2e-3;  // whole rings: shifted or not, five of them
+            // Whole rings: shifted or not, five of them.
+            const double exact = pull / (height * (0.75 / M + 0.25 / (contrast * M))) * 2e-3;
             worst = std::max(worst, std::abs(run.equilibrium.reactions()[0].y() / exact - 1));
         }
         hard_case(fmt::format("layers in a row, contrast {:.0f}", contrast),

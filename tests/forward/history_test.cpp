@@ -515,8 +515,8 @@ TEST(VerificationHistory, CantileverComesToItsPlasticMoment) {
 TEST(VerificationHistory, ComesToElasticWood) {
     for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
         Scene scene = at_equilibrium(ring_specimen(3e-3, 0.5e-3));
-        scene.specimen.rings =
-            Rings{Vec2(-1000.0, 5e-3), 2e-3, 0.25, 0.0};  // bands of one cell: elastic cells of two woods know where each lies
+        // Bands of one cell: elastic cells of two woods know where each lies.
+        scene.specimen.rings = Rings{Vec2(-1000.0, 5e-3), 2e-3, 0.25, 0.0};
         scene.model.plane = plane;
         scene.edges[0].velocity[1] = 1e-4;
         scene.edges[0].until = 1.0;

@@ -89,8 +89,8 @@ TEST(UnitSegment, DirectionFromASecondPicture) {
     cv::Mat stripes(pixels.size(), CV_8U);
     for (int y = 0; y < stripes.rows; ++y)
         for (int x = 0; x < stripes.cols; ++x)
-            stripes.at<std::uint8_t>(y, x) =
-                static_cast<std::uint8_t>(128 + 80 * std::sin(0.3 * (x - y)));  // brightest along 45 degrees
+            // Brightest along 45 degrees.
+            stripes.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(128 + 80 * std::sin(0.3 * (x - y)));
     const TemporaryFolder folder;
     ASSERT_TRUE(cv::imwrite((folder / "a.png").string(), pixels) && cv::imwrite((folder / "b.png").string(), stripes) &&
                 cv::imwrite((folder / "c.png").string(), stripes.rowRange(0, 100)));

@@ -188,8 +188,8 @@ TEST(SystemExplore, AProfileThatNeverRisesIsTheWholeBox) {
         return record;
     };
     Study study = wedge_study(FakeWedge{});
-    study.experiments[0].scene.materials["LW"].toughness =
-        80;  // with EW 100 their product is that of opposite corners of the box
+    // With EW 100 their product is that of opposite corners of the box.
+    study.experiments[0].scene.materials["LW"].toughness = 80;
     study.experiments[0].data = measure(product(study.experiments[0].scene, nullptr), 0.05, 0, 2);
     study.experiments[0].data.crack_length.clear();
     study.experiments[0].noise.force = 0.05;
