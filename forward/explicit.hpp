@@ -74,7 +74,6 @@ class ExplicitSolver {
         double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
         double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
         Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
-        Vec2 intensities = Vec2::Zero();                               // K_I, K_II, a mean over its last turns [Pa sqrt(m)]
         std::unique_ptr<TipPatch> patch;                               // as of some time ago
         double since_patch = 0;                                        // how far it has gone since that was made [m]
         Vec2 patch_direction = Vec2::Zero();                           // then

@@ -9,7 +9,7 @@ namespace crampfit {
 
 namespace {
 
-// A tip asks for its direction anew after this part of a cell.
+// A tip that its opening steers asks for its direction anew after this part of a cell.
 constexpr double leg_in_cells = 0.25;
 
 // The opening that gives a direction is a mean over the time in which a Rayleigh wave goes so many cells, the reach of J's
@@ -56,14 +56,15 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (way < least_way_in_cells * cell) return;
 
     Vec2 direction = tip.direction;
-    if (state.since_turn >= leg_in_cells * cell) {
+    const GrowthDirection criterion = scene_.cracks[crack].direction;
+    const bool by_intensities = steered_by_intensities(criterion);
+    const double leg = (by_intensities ? 1.0 : leg_in_cells) * cell;
+    if (state.since_turn >= leg) {
         TipLoad load = load_at(crack, at_end);
-        const double newest = std::isfinite(state.since_turn) ? leg_in_cells : 1.0;  // a mean over a cell or so
-        state.intensities += newest * (Vec2(load.K_I, load.K_II) - state.intensities);
-        load.K_I = state.intensities[0];
-        load.K_II = state.intensities[1];
         load.opening = state.opening;
-        direction = growth_direction(scene_.cracks[crack].direction, tip, load, materials_, leg_in_cells * cell);
+        direction = growth_direction(criterion, tip, load, materials_, leg);
+        // Waves make K_I and K_II swing: half of a turn is taken, the other half if the next leg still asks for it.
+        if (by_intensities && std::isfinite(state.since_turn)) direction = (direction + tip.direction).normalized();
         state.since_turn = 0.0;
     }
     state.since_turn += way;

@@ -107,6 +107,10 @@ Vec2 branch_intensities(double angle, double K_I, double K_II) {
     return {I_I * K_I + I_II * K_II, II_I * K_I + II_II * K_II};
 }
 
+bool steered_by_intensities(GrowthDirection criterion) {
+    return criterion == GrowthDirection::hoop_stress || criterion == GrowthDirection::energy_release_rate;
+}
+
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
                       double increment) {
     switch (criterion) {

@@ -32,6 +32,13 @@ constexpr std::size_t kept_places = 32;
 // parabola has its least between them, and the load its peak half of that higher.
 constexpr double narrow = 0.04;
 
+// How far a tip has gone straight since the crack's last bend; infinite where there is none [m].
+double leg(const CrackLine& line, bool at_end) {
+    const std::size_t corners = line.points.size();
+    if (corners < 3) return never;
+    return (line.tip(at_end).position - (at_end ? line.points[corners - 2] : line.points[1])).norm();
+}
+
 bool is_narrow(double before, double least, double after) {
     return least > 0.0 && before > least && after > least && before - 2.0 * least + after > narrow * least;
 }
@@ -71,11 +78,14 @@ void Quasistatic::enter(const Place& place) {
 
 Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, int quarters) const {
     if (leader_) return leader_->places_[places_.size()].station.tips[growing.crack][growing.at_end];
-    const CrackTip& tip = equilibrium_.cracks().lines[growing.crack].tip(growing.at_end);
-    const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
+    const CrackLine& line = equilibrium_.cracks().lines[growing.crack];
+    const CrackTip& tip = line.tip(growing.at_end);
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
-    return tip.position +
-           0.25 * quarters * growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
+    const double way = 0.25 * quarters * growing.increment;
+    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (1.0 - 1e-6) * body_.layout.cell.maxCoeff())
+        return tip.position + way * tip.direction;
+    const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
+    return tip.position + way * growth_direction(criterion, tip, load, materials_, growing.increment);
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.

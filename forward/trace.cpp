@@ -323,11 +323,12 @@ class Tracer {
     void record_paths() {
         for (std::size_t k = 0; k < scene_.cracks.size(); ++k) {
             std::vector<Vec2> path = scene_.cracks[k].points;
+            const double hair = 1e-12 * last_.lengths[k];
             const auto add = [&](const std::array<Vec2, 2>& tips) {
-                if (tips[1] != path.back()) path.push_back(tips[1]);
-                if (tips[0] != path.front()) path.insert(path.begin(), tips[0]);
+                if ((tips[1] - path.back()).norm() > hair) path.push_back(tips[1]);
+                if ((tips[0] - path.front()).norm() > hair) path.insert(path.begin(), tips[0]);
             };
-            for (std::size_t i = 0; i < critical_.size() && walk_.station(i).lengths[k] <= last_.lengths[k] * (1.0 + 1e-12); ++i)
+            for (std::size_t i = 0; i < critical_.size() && walk_.station(i).lengths[k] <= last_.lengths[k] + hair; ++i)
                 add(walk_.station(i).tips[k]);
             add(last_.tips[k]);
             record_.paths.push_back(path);

@@ -1,0 +1,108 @@
+// Specimens cut from the photograph of a disk: segmented by the command, then split across and along the rings.
+#include "datasets/io.hpp"
+#include "tests/cli/command.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+using namespace crampfit;
+
+namespace {
+
+struct Cut {
+    const char* name;
+    const char* pulled;  // side that moves
+    const char* held;
+    const char* velocity;
+    const char* notch;
+};
+
+std::string scene(const Cut& cut, double cell) {
+    return fmt::format(R"(
+[model]
+plane = "strain"
+thickness = "10 mm"
+cell = "{} mm"
+
+[specimen]
+size = ["12 mm", "12 mm"]
+file = "disk.h5"
+offset = ["-12 mm", "-10 mm"]
+
+[materials]
+EW = {{ kind = "isotropic", E = "40 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "100 J/m^2" }}
+LW = {{ kind = "isotropic", E = "1200 MPa", nu = 0.33, density = "760 kg/m^3", toughness = "100 J/m^2" }}
+
+[[edges]]
+name = "pulled"
+side = "{}"
+velocity = {}
+
+[[edges]]
+name = "held"
+side = "{}"
+velocity = ["0 mm/min", "0 mm/min"]
+
+[[cracks]]
+points = {}
+grows = "end"
+direction = "hoop stress"
+advance = "0.4 mm"
+
+[measure]
+force = "pulled"
+displacement = "pulled"
+
+[solver]
+kind = "quasistatic"
+
+[stop]
+displacement = "1.5 mm"
+)",
+                       cell, cut.pulled, cut.velocity, cut.held, cut.notch);
+}
+
+// Distance of x from a way.
+double apart(const Vec2& x, const std::vector<Vec2>& way) {
+    double nearest = INFINITY;
+    for (std::size_t k = 0; k + 1 < way.size(); ++k) {
+        const Vec2 along = way[k + 1] - way[k];
+        const double share = std::clamp((x - way[k]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+        nearest = std::min(nearest, (x - way[k] - share * along).norm());
+    }
+    return nearest;
+}
+
+// Each crack goes through, and cells half as wide show the same way.
+TEST(SlowDisk, ScenesCutFromItSplit) {
+    const auto image = std::filesystem::path(SHARED_DATA) / "wood" / "urudendro_f02c_crop.png";
+    if (!std::filesystem::exists(image)) GTEST_SKIP() << "there is no " << image;
+    Command command;
+    const Outcome found = command.run({"segment", image.string(), "-o", command.path("disk.h5"), "--pixel", "50 um"});
+    ASSERT_EQ(found.status, 0) << found.error;
+    const char *right = R"(["1 mm/min", "0 mm/min"])", *up = R"(["0 mm/min", "1 mm/min"])";
+    const Cut cuts[] = {{"TR+", "right", "left", right, R"([["6 mm", "12 mm"], ["6 mm", "9 mm"]])"},
+                        {"TR-", "right", "left", right, R"([["6 mm", "0 mm"], ["6 mm", "3 mm"]])"},
+                        {"RT", "top", "bottom", up, R"([["0 mm", "6.3 mm"], ["3 mm", "6.3 mm"]])"}};
+    for (const Cut& cut : cuts) {
+        std::vector<Vec2> ways[2];
+        for (const int fine : {0, 1}) {
+            command.folder.write("scene.toml", scene(cut, fine ? 0.1 : 0.2));
+            const Outcome run = command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5")});
+            ASSERT_EQ(run.status, 0) << cut.name << ": " << run.error;
+            const Record record = read_record(command.path("record.h5"));
+            EXPECT_EQ(record.status, RunStatus::split) << cut.name << ", cells " << (fine ? 0.1 : 0.2) << ": " << record.message;
+            ways[fine] = record.paths[0];
+        }
+        double worst = 0.0;
+        for (const Vec2& x : ways[0]) worst = std::max(worst, apart(x, ways[1]));
+        std::printf("%s: from one grid to the other the ways are up to %.2f mm apart\n", cut.name, 1e3 * worst);
+        EXPECT_LT(worst, 0.4e-3) << cut.name;  // two of the coarse cells
+    }
+}
+
+}  // namespace
