@@ -26,10 +26,12 @@ constexpr double least_contrast = 2.0;
 // In cells from the way to such a side: all that is missed counts up to the first, nothing from the second on.
 constexpr double near = 3.0, far = 4.0;
 
-// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Far more,
-// or less than half, says that both do not see a crack that has turned sharply alike. The bounds are a judgement: in the paper's
-// scenes sound boxes hold 5 % more to 25 % less.
+// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Where a
+// crack has turned sharply far more, or less than half, says that both do not see it alike. These bounds are a judgement: in the
+// paper's scenes sound boxes hold 5 % more to 25 % less. About a straight crack that has just left wood 38 times as stiff they
+// hold as little as two fifths, and rightly so.
 constexpr double most_of_coarse = 1.1, least_of_coarse = 0.5;
+constexpr double least_sharp_turn = 0.5;  // [rad]: from cell to cell a crack turns by 45 degrees
 
 // Between two straight lines that do not cross [m].
 double distance_between(const std::array<Vec2, 2>& a, const std::array<Vec2, 2>& b) {
@@ -39,6 +41,15 @@ double distance_between(const std::array<Vec2, 2>& a, const std::array<Vec2, 2>&
         least = std::min(least, (a[0] + nearest_on_segment(a[0], a[1], b[k]) * (a[1] - a[0]) - b[k]).norm());
     }
     return least;
+}
+
+bool turns_sharply(const CrackLine& line, const Box& box) {
+    for (std::size_t k = 1; k + 1 < line.points.size(); ++k) {
+        const Vec2 before = (line.points[k] - line.points[k - 1]).normalized();
+        const Vec2 after = (line.points[k + 1] - line.points[k]).normalized();
+        if (box.contains(line.points[k]) && before.dot(after) < std::cos(least_sharp_turn)) return true;
+    }
+    return false;
 }
 
 // What part of the energy missed on a way counts.
@@ -188,7 +199,8 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
             (finer ? fine : coarse).push_back(&part);
         }
         const double held = fine.back()->potential(), of = coarse.back()->potential();
-        if (!(held >= least_of_coarse * of && held <= most_of_coarse * of)) return {};
+        const bool alike = held >= least_of_coarse * of && held <= most_of_coarse * of;
+        if (!alike && turns_sharply(line, box)) return {};
         missed.energy += place.share * (held - of);
         views.push_back(fine.back()->view());
         cell *= 0.5;

@@ -160,11 +160,13 @@ void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slop
 void Quasistatic::show_shifted(std::size_t number, int time) {
     constexpr double most = 2.0;  // change of the logarithm
     Place& place = places_[number];
-    LoadState state = place.states.at(time);
+    LoadState& state = place.station.states[time];
+    state = place.states.at(time);
     const std::vector<LoadState>& slopes = place.slopes.at(time).states;
     const auto move = [&](double& value, auto slope_of) {
         double change = 0.0;
         for (std::size_t n = 0; n < shift_.size(); ++n) change += shift_[n] * slope_of(slopes[n]);
+        if (change == 0.0) return;  // as of all bodies but the gauge's
         if (std::abs(change) <= most * std::abs(value)) value *= std::exp(value != 0.0 ? change / value : 0.0);
         else value += change;
     };
@@ -177,7 +179,6 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
         for (int axis = 0; axis < 2; ++axis)
             move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
     for (std::size_t k = 0; k < state.tips.size(); ++k) move(state.tips[k].G, [&](const LoadState& s) { return s.tips[k].G; });
-    place.station.states[time] = std::move(state);
 }
 
 void Quasistatic::shift(const std::vector<double>& by) {
@@ -185,7 +186,8 @@ void Quasistatic::shift(const std::vector<double>& by) {
     shift_ = std::any_of(by.begin(), by.end(), [](double d) { return d != 0.0; }) ? by : std::vector<double>{};
     if (shift_ == before) return;
     for (Place& place : places_) {
-        place.station.states = shift_.empty() ? place.states : std::map<int, LoadState>{};
+        if (shift_.empty()) place.station.states = place.states;
+        else std::erase_if(place.station.states, [&](const auto& state) { return !place.slopes.count(state.first); });
         place.guessed.clear();
         place.station.ahead.clear();
     }

@@ -2,7 +2,10 @@
 
 #include "inverse/differences.hpp"
 #include "inverse/profile.hpp"
-#include "inverse/walk_descent.hpp"
+#include "inverse/sobol_points.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -16,12 +19,12 @@ constexpr double rise = 9;               // of the misfit, in what the noise exp
 constexpr double room = 3;               // for correlation, and from one window to a wider one
 constexpr double errors_wide = 12;       // half width in standard errors: a difference is three quarters of one
 constexpr double agreement = 1.4;        // of a window with the errors that it finds
-constexpr int most_rounds = 6;
-constexpr int most_profiles = 4;  // in windows of rising width
+constexpr int most_rounds = 10;
+constexpr int points_a_parameter = 12;  // of a spread
+constexpr int most_profiles = 4;        // in windows of rising width
+constexpr double rounding = 1e-9;       // of the box
 
 bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
-
-bool is_whole(const Window& window) { return window.width().minCoeff() >= 1.0; }
 
 // As far along each axis, either way, as the misfit needs to rise.
 Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::VectorXd& x) {
@@ -45,15 +48,50 @@ Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::
         below[j] = room * distance(j, -1);
         above[j] = room * distance(j, 1);
     }
-    return {x, below, above};
+    return Window::around(x, below, above);
+}
+
+Eigen::VectorXd in_box(const Eigen::VectorXd& x) { return x.cwiseMax(0.0).cwiseMin(1.0); }
+
+// Runs at points spread evenly about one, within the reach of the window's differences; what would lie outside the box at its
+// bound.
+void spread_about(const Eigen::VectorXd& x, CloseLook& look, unsigned seed) {
+    const Eigen::VectorXd y = look.window.share(x);
+    std::vector<Eigen::VectorXd> points{y};
+    for (const Eigen::VectorXd& even : sobol_points(points_a_parameter * static_cast<int>(x.size()), x.size(), seed)) {
+        const Eigen::VectorXd away = difference_reach * (2.0 * even.array() - 1.0);
+        points.push_back(look.window.share(in_box(look.window.inside(y + away))));
+    }
+    look.objective.at(points);
 }
 
 // Alike to either side: the edge of a jump nearby says nothing of the valley along it.
 Window wider(const Window& window, const Eigen::VectorXd& x) {
-    return {x, Eigen::VectorXd(room * (x - window.low).cwiseMax(window.high - x))};
+    const Eigen::VectorXd y = window.share(x);
+    const Eigen::VectorXd half = y.cwiseMax(Eigen::VectorXd(1.0 - y.array()));
+    return {x, Eigen::MatrixXd(window.axes * (2 * room * half).asDiagonal())};
 }
 
-// Puts the profile's intervals in the place of those of a parabola. False where one of them does not end in the window.
+// Along the principal axes of what the look says of the covariance, as they are in its window, so many standard errors wide; no
+// wider than by what one step allows, nor than the box. Absent where that is what the look has.
+std::optional<Window> along_valley(const CloseLook& look, const Eigen::VectorXd& x) {
+    if (look.uncertainty.model_variance.size() == 0) {
+        return wider(look.window, x);
+    }
+    const Eigen::MatrixXd inverse = look.window.axes.inverse();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> principal(inverse * look.uncertainty.covariance * inverse.transpose());
+    Eigen::MatrixXd axes = look.window.axes * principal.eigenvectors();
+    bool agrees = true;
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+        const double wanted = std::min(2 * errors_wide * std::sqrt(std::max(0.0, principal.eigenvalues()[k])), room);
+        const double factor = std::min(wanted, 2.0 / axes.col(k).cwiseAbs().maxCoeff());
+        agrees = agrees && factor < agreement && factor > 1 / agreement;
+        axes.col(k) *= factor;
+    }
+    return agrees ? std::nullopt : std::optional<Window>(std::in_place, x, axes);
+}
+
+// Puts the profile's intervals in the place of those of a parabola. False where one of them does not end in its window.
 bool take_profile(CloseLook& look) {
     Uncertainty& u = look.uncertainty;
     if (u.model_variance.size() == 0) {
@@ -61,32 +99,41 @@ bool take_profile(CloseLook& look) {
     }
     const bool told = all_told(u);
     const double level = u.quantile * u.quantile * u.widening;
+    double least = look.objective.best()->evaluation->misfit;
     Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
     for (Eigen::Index j = 0; j < lower.size(); ++j) {
+        CloseLook::Along way = look.along(j);
+        const double scale = way.window.axes(j, 0);
         double below = 0, above = 0;  // distances
         const double own = told ? u.quantile * std::sqrt(u.model_variance[j]) : 0.0;
         if (told) {
             const double variance = u.covariance(j, j) - u.model_variance[j];
-            const Eigen::VectorXd valley = u.covariance.col(j) / u.covariance(j, j);
-            const auto end = [&](int side) {
-                const double least = look.objective.best()->evaluation->misfit;
-                return profile_end(look.objective, u.best, j, side, u.quantile * std::sqrt(variance), valley, least, level);
+            const Eigen::VectorXd valley = way.covariance.col(0) / way.covariance(0, 0);
+            const auto end = [&](int side) -> std::optional<double> {
+                if (way.objective.best()) {
+                    least = std::min(least, way.objective.best()->evaluation->misfit);
+                }
+                const double half = u.quantile * std::sqrt(variance) / scale;
+                const auto found = profile_end(way.objective, way.best, 0, side, half, valley, least, level);
+                const double edge = way.window.origin[j] + (side < 0 ? 0.0 : scale);
+                const bool is_bound = edge < rounding || edge > 1.0 - rounding;
+                return found || !is_bound ? found : std::optional(std::abs(edge - u.best.x[j]) / scale);
             };
             const auto low = end(-1), high = low ? end(1) : std::nullopt;
             if (!high) {
                 return false;
             }
-            below = *low;
-            above = *high;
+            below = *low * scale;
+            above = *high * scale;
         } else {
             constexpr double coarse = 0.1;  // of the window: twice the profile's steps
-            const Profile profile = profile_likelihood(look.objective, u.best, j, coarse, level);
+            const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
             const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
             if (ends.first <= 0.0 || ends.second >= 1.0) {
                 return false;
             }
-            below = u.best.x[j] - ends.first;
-            above = ends.second - u.best.x[j];
+            below = (way.best.x[0] - ends.first) * scale;
+            above = (ends.second - way.best.x[0]) * scale;
         }
         // The model's own scatter, which no profile of it shows, comes on top.
         lower[j] = std::max(0.0, u.best.x[j] - std::hypot(below, own));
@@ -107,31 +154,44 @@ bool take_profile(CloseLook& look) {
 
 }  // namespace
 
-Uncertainty CloseLook::in_box() const {
-    Uncertainty result = uncertainty;
-    const Eigen::VectorXd width = window.width();
-    result.best.x = window.inside(uncertainty.best.x);
-    result.covariance = width.asDiagonal() * uncertainty.covariance * width.asDiagonal();
-    result.lower_95 = window.inside(uncertainty.lower_95);
-    result.upper_95 = window.inside(uncertainty.upper_95);
-    if (result.model_variance.size() > 0) {
-        result.model_variance = width.cwiseAbs2().cwiseProduct(uncertainty.model_variance);
-    }
-    return result;
+// The window's edges, as a covariance, in the triangular form that begins with the parameter (Cholesky).
+CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
+    Eigen::PermutationMatrix<Eigen::Dynamic> first(window.axes.rows());
+    first.setIdentity();
+    first.applyTranspositionOnTheRight(0, parameter);
+    const Eigen::MatrixXd shape = first.transpose() * (window.axes * window.axes.transpose()) * first;
+    Window along(window.centre(), Eigen::MatrixXd(first * Eigen::MatrixXd(shape.llt().matrixL())));
+    const double from = along.origin[parameter], width = along.axes(parameter, 0);
+    const double low = std::max(0.0, -from / width), high = std::min(1.0, (1.0 - from) / width);
+    along.origin += low * along.axes.col(0);
+    along.axes.col(0) *= high - low;
+    const auto evaluate = [near = near, along](const Eigen::VectorXd& y, int threads) {
+        return near(in_box(along.inside(y)), threads);
+    };
+    const Eigen::MatrixXd inverse = along.axes.inverse();
+    return {along,
+            Objective(objective.parameters(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()),
+            {along.share(uncertainty.best.x), uncertainty.best.evaluation},
+            inverse * uncertainty.covariance * inverse.transpose()};
 }
 
 std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
                                     const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed) {
     // Nothing where the user's stop comes before the first run.
     const auto look = [&](const Window& window) -> std::optional<CloseLook> {
-        const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) { return near(window.inside(y), threads); };
-        CloseLook here{
-            window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()), {}};
-        spread_about(here.objective, window.share(x), difference_step, seed);
+        const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) {
+            const Eigen::VectorXd wanted = window.inside(y), at = in_box(wanted);
+            return (wanted - at).cwiseAbs().maxCoeff() < rounding ? near(at, threads) : Evaluation{"outside the bounds", {}, {}};
+        };
+        CloseLook here{window,
+                       Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()),
+                       {},
+                       near};
+        spread_about(x, here, seed);
         if (!here.objective.best()) {
             return std::nullopt;
         }
-        here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step);
+        here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step, window);
         return here;
     };
     const auto first = look(as_wide_as_the_misfit_says(near, x));
@@ -139,22 +199,13 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
         return std::nullopt;
     }
     CloseLook found = *first;
-    while (!all_told(found.uncertainty) && !is_whole(found.window)) {
-        auto here = look(wider(found.window, x));
-        if (!here) {
-            break;
-        }
-        found = std::move(*here);
-    }
-    for (int round = 0; round < most_rounds && all_told(found.uncertainty) && !objective.stopped(); ++round) {
-        const Eigen::VectorXd errors = found.uncertainty.covariance.diagonal().cwiseSqrt().cwiseProduct(found.window.width());
-        const Window wanted(x, errors_wide * errors);
-        const Eigen::VectorXd ratio = wanted.width().cwiseQuotient(found.window.width());
-        if (ratio.maxCoeff() < agreement && ratio.minCoeff() > 1 / agreement) {
-            break;
-        }
-        auto here = look(wanted);
-        if (!here || !all_told(here->uncertainty)) {
+    const auto goes_beyond_box = [](const CloseLook& l) {
+        return !all_told(l.uncertainty) && l.window.axes.cwiseAbs().maxCoeff() > 1.0 + rounding;
+    };
+    for (int round = 0; round < most_rounds && !goes_beyond_box(found) && !objective.stopped(); ++round) {
+        const auto wanted = along_valley(found, x);
+        auto here = wanted ? look(*wanted) : std::nullopt;
+        if (!here || (all_told(found.uncertainty) && !all_told(here->uncertainty))) {
             break;
         }
         found = std::move(*here);

@@ -10,19 +10,30 @@
 
 namespace crampfit {
 
-/// How sure a point is, seen through a window about it: objective and uncertainty are those of the window as a unit cube.
+/// How sure a point is, seen through a window about it: the objective is that of the window as a unit cube.
 struct CloseLook {
     Window window;
     Objective objective;
     Uncertainty uncertainty;
+    Objective::Evaluate near;  // of the box
 
-    Uncertainty in_box() const;  // of the whole unit cube
+    /// What a profile of a parameter goes through: a window about the same place as wide, whose first axis is the only one to
+    /// change it. Points outside the box stand for the nearest one within.
+    struct Along {
+        Window window;
+        Objective objective;
+        Run best;                    // of the window
+        Eigen::MatrixXd covariance;  // the same
+    };
+    Along along(Eigen::Index parameter) const;
 };
 
 /// Intervals about a point x [parameters] where runs nearby, `near`, are cheap. The window is as wide as the misfit says, so that
 /// its differences span what the intervals do: a curve with jumps has kinks that a derivative at a point does not see, and wide
-/// differences are blunt where the data are sharp. The intervals take in those of the profile likelihood, as at the edge of a
-/// jump the misfit is no parabola; where that does not end and differences see no slope, the parameters cannot be told.
+/// differences are blunt where the data are sharp. It lies along the principal axes of the covariance, found by turns: where
+/// parameters stand in for one another, as a tough wood for a stiff one, along no axis of the box do differences stay in the
+/// valley and yet go as far as its intervals. The intervals take in those of the profile likelihood, as at the edge of a jump
+/// the misfit is no parabola; where that does not end and differences see no slope, the parameters cannot be told.
 /// `objective` says how many threads there are and when to stop: nothing comes back where that is before the first run;
 /// `curve_lengths` and `names` as in `estimate_uncertainty`.
 std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,

@@ -35,22 +35,20 @@ std::optional<Objective> surrogate(const Objective& objective, const Uncertainty
         0, 1);
 }
 
-// Standard errors within the box, one each parameter.
-Eigen::VectorXd standard_errors(const Uncertainty& uncertainty) { return uncertainty.covariance.diagonal().cwiseSqrt(); }
-
 double rise_of(const Uncertainty& uncertainty) { return uncertainty.quantile * uncertainty.quantile * uncertainty.widening; }
 
 }  // namespace
 
-Exploration explore(Objective& objective, const Uncertainty& uncertainty, const UncertaintyChoice& choice, int data_residuals,
-                    bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage) {
+Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& uncertainty, const UncertaintyChoice& choice,
+                    int data_residuals, bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage) {
     Exploration result;
     std::optional<Objective> polynomials = cheap ? std::nullopt : surrogate(objective, uncertainty);
     if (uncertainty.model_variance.size() == 0 || (!cheap && !polynomials)) {
         result.message = "Too few runs ended well near the best one for a profile or a posterior. ";
         return result;
     }
-    Objective& model = cheap ? objective : *polynomials;
+    Objective& model = !cheap ? *polynomials : close ? close->objective : objective;
+    const Window window = cheap && close ? close->window : Window(uncertainty.best.x.size());
     if (!cheap) {
         result.message =
             "Profile and posterior rest on polynomials of the residuals over the runs about the best one, as each run "
@@ -58,14 +56,24 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
     }
     if (choice.profile) {
         stage("profile");
-        const Eigen::VectorXd errors = standard_errors(uncertainty);
         const Run best = cheap ? uncertainty.best : [&] {
             model.set_budget_left(1);
             return Run{uncertainty.best.x, model.at(uncertainty.best.x)};
         }();
         for (Eigen::Index j = 0; j < model.parameters(); ++j) {
-            model.set_budget_left(runs_of_a_profile);
-            result.profiles.push_back(profile_likelihood(model, best, j, errors[j], rise_of(uncertainty)));
+            const double rise = rise_of(uncertainty);
+            if (cheap && close) {
+                CloseLook::Along way = close->along(j);
+                way.objective.set_budget_left(runs_of_a_profile);
+                Profile profile = profile_likelihood(way.objective, way.best, 0, std::sqrt(way.covariance(0, 0)), rise);
+                for (double& x : profile.x) {
+                    x = std::clamp(way.window.origin[j] + x * way.window.axes(j, 0), 0.0, 1.0);
+                }
+                result.profiles.push_back(profile);
+            } else {
+                model.set_budget_left(runs_of_a_profile);
+                result.profiles.push_back(profile_likelihood(model, best, j, std::sqrt(uncertainty.covariance(j, j)), rise));
+            }
         }
     }
     if (choice.posterior > 0) {
@@ -76,8 +84,12 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
             const double of_priors = r.tail(r.size() - data_residuals).squaredNorm();
             return -0.5 * (r.head(data_residuals).squaredNorm() / uncertainty.widening + of_priors);
         };
-        result.posterior =
-            draw_ensemble(model, log_likelihood, uncertainty.best.x, uncertainty.covariance, choice.posterior, seed);
+        const Eigen::MatrixXd inverse = window.axes.inverse();
+        result.posterior = draw_ensemble(model, log_likelihood, window.share(uncertainty.best.x),
+                                         inverse * uncertainty.covariance * inverse.transpose(), choice.posterior, seed);
+        for (Run& sample : result.posterior.samples) {
+            sample.x = window.inside(sample.x);
+        }
         const double time = result.posterior.correlation_time.maxCoeff();
         result.message += fmt::format(
             "{} samples of the posterior, worth {:.0f} independent ones ({:.0f} % of the moves made); flat within the bounds on "
@@ -88,16 +100,13 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
     return result;
 }
 
-void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty,
-                      const Exploration& exploration) {
+void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertainty, const Exploration& exploration) {
     fit.message += exploration.message;
     for (std::size_t j = 0; j < exploration.profiles.size(); ++j) {
         const auto k = static_cast<Eigen::Index>(j);
         const Profile& profile = exploration.profiles[j];
         FittedParameter& parameter = fit.parameters[j];
-        const auto value_at = [&](double y) {
-            return box.value(k, window.low[k] + y * window.width()[k]) / box.parameters()[j].unit_factor;
-        };
+        const auto value_at = [&](double x) { return box.value(k, x) / box.parameters()[j].unit_factor; };
         for (std::size_t i = 0; i < profile.x.size(); ++i) {
             fit.profile.push_back({parameter.name, value_at(profile.x[i]), profile.misfit[i]});
         }
@@ -113,14 +122,14 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const 
                                        lower > 0.0   ? "above"
                                        : upper < 1.0 ? "below"
                                                      : "above or below",
-                                       window.low[k] > 0.0 || window.high[k] < 1.0 ? "many standard errors" : "its bounds");
+                                       profile.x.front() > 0.0 && profile.x.back() < 1.0 ? "many standard errors" : "its bounds");
         }
     }
     if (!exploration.profiles.empty() && fit.message.find("profile likelihood") == std::string::npos) {
         fit.message += "The intervals are those of the profile likelihood. ";
     }
     for (const Run& sample : exploration.posterior.samples) {
-        fit.posterior.push_back({in_units(box, window.inside(sample.x)), sample.evaluation->misfit});
+        fit.posterior.push_back({in_units(box, sample.x), sample.evaluation->misfit});
     }
 }
 

@@ -136,9 +136,8 @@ std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point
                             double resolution, unsigned seed) {
     Fingerprint print;
     print.add(point).add(resolution).add(rough).add(seed).add(static_cast<double>(study.optimizer.loss));
-    for (const Eigen::VectorXd* end : {&window.low, &window.high}) {
-        print.add(std::vector<double>(end->begin(), end->end()));
-    }
+    print.add(std::vector<double>(window.origin.begin(), window.origin.end()));
+    print.add(std::vector<double>(window.axes.reshaped().begin(), window.axes.reshaped().end()));
     for (const Parameter& parameter : study.parameters) {
         print.add(parameter.lower).add(parameter.upper).add(static_cast<double>(parameter.scale));
     }
@@ -281,7 +280,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         std::future<Evaluation> wide;    // there, the best values on cells twice as wide
         const auto estimate = [&] {
             if (!by_walks) {
-                return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
+                return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
             }
             const Eigen::VectorXd x = objective.best()->x;
             walks.catch_up(of_point(x));
@@ -291,7 +290,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 return store.at(key, [&] { return run_on_wide_cells(study, values, options.stop_requested); });
             });
             close = look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed);
-            return close ? close->uncertainty : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
+            return close ? close->uncertainty
+                         : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
         };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
@@ -299,7 +299,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             }
             const bool cheap = own ? only_toughness || by_walks : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
-            return explore(close ? close->objective : objective, about, study.uncertainty, stations, cheap, options.seed, stage);
+            return explore(objective, close ? &*close : nullptr, about, study.uncertainty, stations, cheap, options.seed, stage);
         };
         Uncertainty uncertainty = estimate();
         Exploration exploration = look_around(uncertainty);
@@ -313,17 +313,16 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         const Run best = *objective.best();
         fit.status = objective.stopped() ? FitStatus::interrupted : found.converged ? FitStatus::converged : FitStatus::run_limit;
         fit.message = explain(fit.status);
-        fill_parameters(fit, box, best.x, close ? close->in_box() : uncertainty);
+        fill_parameters(fit, box, best.x, uncertainty);
         fit.message += uncertainty.message;
         if (close && !only_toughness) {
             fit.message += "What is said of intervals rests on runs moved from the best one by its derivatives. ";
         }
-        const Window whole(best.x, 1.0);
-        fill_exploration(fit, box, close ? close->window : whole, uncertainty, exploration);
+        fill_exploration(fit, box, uncertainty, exploration);
         if (close) {
             const Evaluation there = wide.get();
             if (there.usable() && uncertainty.slope.size() > 0) {
-                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty, close->window));
+                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty));
             } else {
                 fit.message += fmt::format("What the grid leaves is not known; cells twice as wide: {}. ", there.status);
             }

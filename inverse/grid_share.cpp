@@ -63,8 +63,7 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
     return StudyModel(wide, simulation, solver_resolution, stop).at(values, 1);
 }
 
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about,
-                             const Window& window) {
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
     const Eigen::VectorXd values = model.box().values(best.x);
     Evaluation here = *best.evaluation;
     const std::vector<FitResidual> before = model.residuals(here);
@@ -83,7 +82,7 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
         slope.row(row) *= before[i].sigma / after[i].sigma;
         change[row] *= share.at(before[i].experiment);
     }
-    return window.width().cwiseProduct(least_squares(slope, change));
+    return least_squares(slope, change);
 }
 
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {

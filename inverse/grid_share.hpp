@@ -3,7 +3,6 @@
 #include "datasets/fit.hpp"
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
-#include "inverse/window.hpp"
 
 #include <atomic>
 
@@ -23,9 +22,8 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
 /// takes a third of the difference of both grids off has moved away from the wide one by four thirds of that difference: there
 /// three quarters of g count.
 ///
-/// `about` tells of the best point, seen in `window`.
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about,
-                             const Window& window);
+/// `about` tells of the best point.
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
 
 /// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
 /// as spread evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value or, on a

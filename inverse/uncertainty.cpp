@@ -41,9 +41,11 @@ double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>
 /// Names what cannot be told, and remembers whose intervals are the whole box for it.
 class Undetermined {
   public:
-    explicit Undetermined(const std::vector<std::string>& names) : names_(names), is_member_(names.size(), false) {}
+    Undetermined(const std::vector<std::string>& names, const Window& window)
+        : names_(names), window_(window), is_member_(names.size(), false) {}
 
-    void add(const Eigen::VectorXd& direction) {
+    void add(const Eigen::VectorXd& of_window) {
+        const Eigen::VectorXd direction = window_.axes * of_window;
         std::vector<std::string> members;
         for (std::size_t j = 0; j < names_.size(); ++j) {
             if (std::abs(direction[static_cast<Eigen::Index>(j)]) > 0.1 * direction.cwiseAbs().maxCoeff()) {
@@ -60,6 +62,7 @@ class Undetermined {
 
   private:
     const std::vector<std::string>& names_;
+    const Window& window_;
     std::vector<bool> is_member_;
     std::string message_;
 };
@@ -128,10 +131,11 @@ double student_975(int degrees_of_freedom) {
 }
 
 Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names, double step) {
+                                 const std::vector<std::string>& names, double step, const Window& window) {
     const auto directions = directions_about_best(objective, step);
     Uncertainty result;
     result.best = *objective.best();
+    result.best.x = window.inside(result.best.x);
     const Eigen::VectorXd& x = result.best.x;
     const Eigen::VectorXd& residuals = result.best.evaluation->residuals;
     const int p = static_cast<int>(x.size());
@@ -154,13 +158,15 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
                                       "residuals count as one. ",
                                       std::sqrt(widening), result.reduced_chi_square, time);
     }
-    Undetermined undetermined(names);
-    result.covariance = data_covariance(*directions, widening, undetermined);
-    const Eigen::MatrixXd own = model_covariance(*directions);
-    result.covariance += own;
+    Undetermined undetermined(names, window);
+    const auto in_box = [&](const Eigen::MatrixXd& covariance) -> Eigen::MatrixXd {
+        return window.axes * covariance * window.axes.transpose();
+    };
+    const Eigen::MatrixXd own = in_box(model_covariance(*directions));
+    result.covariance = in_box(data_covariance(*directions, widening, undetermined)) + own;
     result.widening = widening;
     result.model_variance = own.diagonal();
-    result.slope = directions->model.jacobian();
+    result.slope = directions->model.jacobian() * window.axes.inverse();
     result.untold = undetermined.message();
     result.message += result.untold;
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "inverse/objective.hpp"
+#include "inverse/window.hpp"
 
 #include <Eigen/Core>
 
@@ -27,6 +28,7 @@ struct Uncertainty {
 /// Intervals about the best run, from how the residuals change with the parameters near it. Runs the differences about
 /// the best point that have not been run yet. `curve_lengths` are the lengths of the measured curves, in the order in
 /// which the residuals hold them; priors follow. `names` are the parameters'; `step` is that of differences, a part of the box.
+/// The objective's points are those of a window of the box, and differences go along its axes; all that is told is of the box.
 /// There must be a usable run.
 ///
 /// covariance = s (J^T J)^-1 + V, J being the slope of a polynomial fitted to the runs about the best point and
@@ -36,11 +38,11 @@ struct Uncertainty {
 ///  V = how far the model's own scatter, run by run, moves the best point, and how far the best run is from the lowest
 ///  point of
 ///      the polynomial: noise, or a search that ended early.
-/// A direction in which the box has less than two standard errors either side of its middle is undetermined: it gets
-/// the variance of a uniform distribution over the box, and the parameters that it is made of get the whole box as
+/// A direction in which the window has less than two standard errors either side of its middle is undetermined: it gets
+/// the variance of a uniform distribution over the window, and the parameters that it is made of get the whole box as
 /// their interval.
 Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names, double step);
+                                 const std::vector<std::string>& names, double step, const Window& window);
 
 /// The 97.5 % point of Student's t distribution.
 double student_975(int degrees_of_freedom);

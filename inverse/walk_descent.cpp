@@ -24,7 +24,6 @@ constexpr double least_rise = 0.05;     // of the misfit, where noise is in it: 
 constexpr double free_of_noise = 0.01;  // of the misfit for each residual: below that it is rounding of data or model
 constexpr int most_unconfirmed = 2;  // steps within the last radius whose gain no run confirms: what is left is the model's noise
 
-constexpr int points_a_parameter = 12;  // of a spread
 constexpr int model_starts = 16;        // for each parameter: of the cheap model, in its window
 constexpr int model_descents = 4;       // from the lowest of them
 constexpr int runs_across_jumps = 200;  // for each parameter
@@ -85,7 +84,7 @@ Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eige
     const auto in_window = [&](const Eigen::VectorXd& y, int share) { return model(window.inside(y), share); };
     Objective cheap(centre.size(), in_window, most_cheap_runs, threads, stop);
     std::vector<Eigen::VectorXd> starts = sobol_points(model_starts * static_cast<int>(centre.size()), centre.size(), seed);
-    starts.front() = window.share(centre);
+    starts.front() = window.share(centre).cwiseMax(0.0).cwiseMin(1.0);
     cheap.at(starts);
     std::vector<Run> order = cheap.runs();
     std::stable_sort(order.begin(), order.end(),
@@ -113,19 +112,6 @@ Lowest lowest_near(const Eigen::VectorXd& point, const Nearby& nearby, bool roug
     return nearby.recall ? nearby.recall(point, window, rough, search) : search();
 }
 
-}  // namespace
-
-void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed) {
-    std::vector<Eigen::VectorXd> points{x};
-    for (const Eigen::VectorXd& even : sobol_points(points_a_parameter * static_cast<int>(x.size()), x.size(), seed)) {
-        const Eigen::VectorXd away = 1.5 * step * (2.0 * even.array() - 1.0);
-        points.push_back((x + away).cwiseMax(0.0).cwiseMin(1.0));
-    }
-    objective.at(points);
-}
-
-namespace {
-
 struct Descent {
     bool converged;          // it ended by its own criterion
     double unconfirmed = 0;  // gain of the misfit that its last steps promised and no run confirmed
@@ -149,9 +135,11 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
             const bool noisy = misfit - gain > free_of_noise * static_cast<double>(here.evaluation->residuals.size());
             return gain > std::max(least_gain * misfit, noisy ? least_rise : 0.0);
         };
-        Lowest trial = lowest_near(here.x, nearby, true, Window(here.x, radius * reach), objective, seed);
+        Lowest trial = lowest_near(here.x, nearby, true, Window::around(here.x, radius * reach), objective, seed);
         if (!is_worth_a_run(misfit - trial.misfit)) {
-            trial = lowest_near(here.x, nearby, false, Window(here.x, std::min(radius, last_radius)), objective, seed);
+            trial = lowest_near(here.x, nearby, false,
+                                Window::around(here.x, Eigen::VectorXd::Constant(here.x.size(), std::min(radius, last_radius))),
+                                objective, seed);
         }
         const double expected = misfit - trial.misfit;
         if (!is_worth_a_run(expected)) {
@@ -188,7 +176,7 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby
     std::vector<Eigen::VectorXd> steps;
     for (const Run& run : objective.runs()) {
         if (run.evaluation->usable()) {
-            steps.push_back(lowest_near(run.x, nearby, true, Window(run.x, 1.0), objective, seed).x);
+            steps.push_back(lowest_near(run.x, nearby, true, Window(run.x.size()), objective, seed).x);
         }
     }
     objective.at(steps);

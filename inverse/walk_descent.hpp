@@ -43,7 +43,4 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
 /// criterion.
 bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed);
 
-/// Runs a cheap model at points spread evenly about a point, within the reach of differences with such a step.
-void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, unsigned seed);
-
 }  // namespace crampfit

@@ -66,6 +66,31 @@ TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
     }
 }
 
+// Out of a latewood of three cells and 38 times the stiffness into earlywood: half a cell behind the boundary coarse cells still
+// see the tip in both, and hold more than twice the energy of finer ones: without boxes the load that carries the crack on, which
+// goes with the root of what is released, would be 40 % off.
+TEST(VerificationFineTip, EnergyReleasedBehindAVeryStiffWood) {
+    const auto released = [](double cell, double from) {
+        Scene scene = two_woods(2e-3, from, cell);
+        scene.specimen.size = {8e-3, 4e-3};
+        scene.specimen.rings = Rings{Vec2(-20e-3, 2e-3), 2.2e-3, 0.25, 0.3e-3};  // latewood up to 2 mm
+        scene.materials["LW"].youngs_modulus = 38 * 40e6;
+        for (Edge& edge : scene.edges) edge.range = {0.0, 2e-3};
+        AtRest run(scene);
+        const Vec2 start(from, 2e-3);
+        const double before = run.equilibrium.potential() + missed_by(run, {}, start, 0.4e-3).energy;
+        run.equilibrium.grow(0, true, start + Vec2(0.4e-3, 0.0));
+        EXPECT_EQ(run.equilibrium.solve(1.0), Equilibrium::Outcome::solved);
+        return before - run.equilibrium.potential() - missed_by(run, {}, start, 0.4e-3).energy;
+    };
+    for (const double from : {2.1e-3, 2.2e-3}) {
+        const double load = std::sqrt(released(0.05e-3, from) / released(0.2e-3, from));
+        std::printf("tip %.1f mm behind stiff wood: load on 0.2 mm cells %+.1f %% of that on 0.05 mm ones\n", 1e3 * from - 2.0,
+                    100 * (load - 1));
+        EXPECT_NEAR(load, 1.0, 0.1) << from;
+    }
+}
+
 TEST(VerificationFineTip, CrackJustOffAGridLineIsTheSame) {
     // In the boxes rows of points lie between the grid line and the crack, which the grid itself does not tell apart.
     const AtRest on(two_woods(2.025e-3, 2.05e-3, 0.1e-3));

@@ -44,7 +44,8 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
         const double width = std::log(400.0 / 20.0);
         objective.at(Eigen::Vector2d(std::log(true_earlywood / 20) / width, std::log(true_latewood / 20) / width));
         const crampfit::Run best = *objective.best();
-        const Uncertainty about = estimate_uncertainty(objective, model.curve_lengths(), {"EW", "LW"}, difference_step);
+        const Uncertainty about =
+            estimate_uncertainty(objective, model.curve_lengths(), {"EW", "LW"}, difference_step, Window(2));
         ASSERT_EQ(about.best.x, best.x);
         Evaluation wide = *best.evaluation;
         const auto stations = model.residuals(wide);
@@ -52,7 +53,7 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
         for (Eigen::Index i = 0; i < change.size(); ++i) {
             wide.modelled[i] += stations[static_cast<std::size_t>(i)].sigma * change[i];
         }
-        const Eigen::VectorXd left = left_by_grid(study, model, best, wide, about, Window(best.x, 1.0));
+        const Eigen::VectorXd left = left_by_grid(study, model, best, wide, about);
         const double share = extrapolates ? 0.75 : 1.0;
         std::printf("left %.6f %.6f of %.6f %.6f\n", left[0], left[1], off[0], off[1]);
         EXPECT_NEAR(left[0], share * off[0], 1e-8);

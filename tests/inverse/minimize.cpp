@@ -304,10 +304,44 @@ TEST(UnitCloseLook, GivesWhatIsKnownWhenTheUserStops) {
         }
         ++looks;
         EXPECT_TRUE(look->objective.best()) << runs;
-        EXPECT_TRUE(look->in_box().best.evaluation) << runs;
+        EXPECT_TRUE(look->uncertainty.best.evaluation) << runs;
     }
     EXPECT_GT(looks, 10);
     EXPECT_LT(looks, 130);
+}
+
+// A narrow valley at 45 degrees to the parameters whose walls soon go flat, as where a tough wood stands in for a stiff one and a
+// crack jumps: misfit (3 tanh(u / 3 s_u))^2 + (v / s_v)^2, whose covariance at the bottom is s_u^2 across and s_v^2 along.
+// Windows as wide along the parameters as the intervals are see the walls where they are flat; a polynomial through what goes as
+// a tanh up to a standard error either side is 3 % less steep than it.
+TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
+    const double s_u = 1e-3, s_v = 0.05;
+    for (const Vector2d& bottom : {Vector2d(0.5, 0.5), Vector2d(0.02, 0.5)}) {  // and beside a bound
+        const auto valley = [&](const VectorXd& x, int) {
+            const Vector2d d = x - bottom;
+            Evaluation evaluation;
+            evaluation.residuals = VectorXd::Ones(30);  // noise, by turns above and below
+            for (Eigen::Index i = 0; i < 30; i += 2) {
+                evaluation.residuals[i] = -1;
+            }
+            evaluation.residuals.head(2) << 3 * std::tanh((d[0] - d[1]) / std::sqrt(2.0) / (3 * s_u)),
+                d.sum() / std::sqrt(2.0) / s_v;
+            evaluation.misfit = evaluation.residuals.squaredNorm();
+            return evaluation;
+        };
+        const Objective objective(2, valley, 100, 1);
+        const auto look = look_close(objective, valley, bottom, {30}, {"a", "b"}, 1);
+        ASSERT_TRUE(look);
+        const Uncertainty& found = look->uncertainty;
+        const auto error_along = [&](const Vector2d& way) { return std::sqrt(0.5 * way.dot(found.covariance * way)); };
+        EXPECT_NEAR(error_along({1, -1}) / s_u, 1.0, 0.05);
+        EXPECT_NEAR(error_along({1, 1}) / s_v, 1.0, 0.05);
+        const double half = found.quantile * std::sqrt(0.5) * s_v;  // of either parameter
+        for (int j = 0; j < 2; ++j) {
+            EXPECT_NEAR(found.lower_95[j], std::max(0.0, bottom[j] - half), 0.05 * half);
+            EXPECT_NEAR(found.upper_95[j], bottom[j] + half, 0.05 * half);
+        }
+    }
 }
 
 }  // namespace
