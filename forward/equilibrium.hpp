@@ -139,6 +139,8 @@ class Equilibrium {
     void add_touches(bool geometric);
     void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
     void add_touch(const SlidingBody& body, int driver, const SlidingBody::Touch& touch, bool geometric);
+    void let_yield(SlidingBody& body, const Vec2& travel);
+    void add_yield(const SlidingBody& body, int driver, const std::vector<SlidingBody::Touch>& touches);
     void add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder);
     bool take_in_spread();
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);

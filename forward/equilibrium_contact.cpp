@@ -1,8 +1,10 @@
 // Of equilibrium, what bodies that follow a force and friction add to it.
 #include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
+#include "forward/local_yield.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -205,6 +207,68 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
     for (std::size_t a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
     rows.resize(size);
     spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size)});
+}
+
+// Wheels that a few cells go round feel what the grid misses of the wood's yield.
+void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
+    constexpr double margin = 3.0;  // of the way [cells]
+    if (!rigid.is_round() || plan_.friction || plan_.remembers || !travel.allFinite()) return;
+    const Box at_start = bounds(rigid.shape());
+    const Vec2 more = margin * body_.layout.cell;
+    const Box way{at_start.low.cwiseMin(at_start.low + travel) - more, at_start.high.cwiseMax(at_start.high + travel) + more};
+    rigid.let_yield(LocalYield::about(way, rigid, scene_, plan_, materials_, body_));
+}
+
+// What the yield s of stations beyond the grid's takes off the springs' stiffness: with s = A P^T N(d - P s) and K = N' the forces follow
+// the depths d by K - K P (1 + A P^T K P)^-1 A P^T K.
+void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vector<SlidingBody::Touch>& touches) {
+    const LocalYield& local = *rigid.yield();
+    std::vector<int> fields, stations;
+    const auto place = [](std::vector<int>& list, int what) {
+        const auto at = std::find(list.begin(), list.end(), what) - list.begin();
+        if (at == static_cast<std::ptrdiff_t>(list.size())) list.push_back(what);
+        return static_cast<Eigen::Index>(at);
+    };
+    const Points& points = body_.points;
+    std::vector<const SlidingBody::Touch*> held;
+    for (const SlidingBody::Touch& touch : touches) {
+        if (!local.holds(touch.facet)) continue;
+        held.push_back(&touch);
+        for (const int next : {0, 1}) place(stations, local.place(touch.facet).station + next);
+        for (const SlidingBody::Hold& hold : rigid.holds(touch.facet))
+            for (int k = 0; k < 4; ++k) place(fields, points.node[hold.point][k]);
+    }
+    if (held.empty()) return;
+    const auto count = static_cast<Eigen::Index>(stations.size()), size = static_cast<Eigen::Index>(2 * fields.size());
+    Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(size + 2, count);  // on fields and the body, per yield of a station [N/m]
+    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(count, count);
+    for (const SlidingBody::Touch* touch : held) {
+        const LocalYield::Place& at = local.place(touch->facet);
+        for (const int next : {0, 1}) {
+            const Eigen::Index s = place(stations, at.station + next);
+            const double share = next ? at.share : 1.0 - at.share;
+            const Vec2 force = share * touch->stiffness * touch->normal;
+            for (const SlidingBody::Hold& hold : rigid.holds(touch->facet))
+                for (int k = 0; k < 4; ++k) pull.col(s).segment<2>(2 * place(fields, points.node[hold.point][k])) += hold.weight[k] * force;
+            pull.col(s).tail<2>() -= force;
+            for (const int other : {0, 1})
+                stiffness(s, place(stations, at.station + other)) += share * touch->stiffness * (other ? at.share : 1.0 - at.share);
+        }
+    }
+    const Eigen::MatrixXd yield = local.yield()(stations, stations);
+    const Eigen::MatrixXd gives = (Eigen::MatrixXd::Identity(count, count) + yield * stiffness).partialPivLu().solve(yield);
+    const Eigen::MatrixXd change = -pull * (0.5 * (gives + gives.transpose())) * pull.transpose();
+    std::vector<int> rows(size + 2);
+    std::vector<double> steps(size + 2);
+    for (Eigen::Index a = 0; a < size + 2; ++a) {
+        const int axis = static_cast<int>(a % 2), dof = a < size ? 2 * fields[a / 2] + axis : -1;
+        rows[a] = dof < 0 ? row_of_body(driver, axis) : row_of(dof);
+        steps[a] = dof < 0 ? still_to_go_[driver][axis] : prescribed_step_[dof];
+    }
+    couple(rows, steps, change);
+    for (Eigen::Index a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
+    rows.resize(size);
+    spread_.push_back({std::move(rows), change.topLeftCorner(size, size)});
 }
 
 // Into the factor.

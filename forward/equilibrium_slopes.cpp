@@ -1,5 +1,6 @@
 #include "forward/deformation.hpp"
 #include "forward/equilibrium.hpp"
+#include "forward/local_yield.hpp"
 
 #include <algorithm>
 
@@ -114,16 +115,26 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     }
     // So are bodies' springs.
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
-        for (const SlidingBody::Touch& touch : sliding_[s].touches(place_of(sliding_driver_[s]), displacement_)) {
-            const Facet& facet = body_.facets[touch.facet];
-            const auto& constants = points.stiffness[points.cell[facet.point]];
-            const int stiffest = constants[0] >= constants[2] ? 0 : 1;
-            for (std::size_t n = 0; n < numbers.size(); ++n) {
+        const std::vector<SlidingBody::Touch> touches = sliding_[s].touches(place_of(sliding_driver_[s]), displacement_);
+        for (std::size_t n = 0; n < numbers.size(); ++n) {
+            Eigen::VectorXd forces(touches.size());
+            for (std::size_t k = 0; k < touches.size(); ++k) {
+                const Facet& facet = body_.facets[touches[k].facet];
+                const auto& constants = points.stiffness[points.cell[facet.point]];
+                const int stiffest = constants[0] >= constants[2] ? 0 : 1;
                 const double stiffer = numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
-                slope.potential[n] += stiffer * touch.energy;
-                const Vec2 push = stiffer * touch.force * touch.normal;
-                for (const SlidingBody::Hold& hold : sliding_[s].holds(touch.facet))
-                    for (int k = 0; k < 4; ++k) add(n, points.node[hold.point][k], -hold.weight[k] * push);
+                slope.potential[n] += stiffer * touches[k].energy;
+                forces[k] = stiffer * touches[k].force;
+            }
+            if (LocalYield* yield = sliding_[s].yield()) {
+                LocalYield::Slope more = yield->slope(touches, std::move(forces), numbers, n);
+                slope.potential[n] += more.energy;
+                forces = std::move(more.forces);
+            }
+            for (std::size_t k = 0; k < touches.size(); ++k) {
+                const Vec2 push = forces[k] * touches[k].normal;
+                for (const SlidingBody::Hold& hold : sliding_[s].holds(touches[k].facet))
+                    for (int m = 0; m < 4; ++m) add(n, points.node[hold.point][m], -hold.weight[m] * push);
                 slope.drivers.col(n).segment<2>(2 * sliding_driver_[s]) += push;
             }
         }
