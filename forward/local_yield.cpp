@@ -15,7 +15,6 @@ constexpr double margin = 6.0;       // of the box about the facets, in cells
 Scene scene_in(const Scene& whole, const Box& box, double cell) {
     Scene scene = whole;
     scene.model.cell = cell;
-    const Vec2 size = whole.specimen.size;
     scene.specimen.size = box.high - box.low;
     const auto move = [&](Shape& shape) {
         if (auto* circle = std::get_if<Circle>(&shape)) circle->centre -= box.low;
