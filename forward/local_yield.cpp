@@ -87,8 +87,8 @@ struct LocalYield::Solved {
     std::vector<MaterialSlope> numbers;
 };
 
-std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan, const MaterialMap& wood,
-                                              const Discretisation& body) {
+std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan,
+                                              const MaterialMap& wood, const Discretisation& body) {
     const Layout& layout = body.layout;
     std::shared_ptr<LocalYield> made(new LocalYield);
     // Stations.
@@ -158,7 +158,8 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
             for (const SlidingBody::Hold& hold : rigid.holds(i)) {
                 const int c = body.points.cell[hold.point];
                 const Layout& part = made->coarse_->body.layout;
-                const int inner = part.cell_index(c % layout.cells_x - static_cast<int>(low.x()), c / layout.cells_x - static_cast<int>(low.y()));
+                const int inner = part.cell_index(c % layout.cells_x - static_cast<int>(low.x()),
+                                                  c / layout.cells_x - static_cast<int>(low.y()));
                 const auto nodes = part.cell_nodes(inner);
                 for (int k = 0; k < 4; ++k) made->coarse_->loads[station][nodes[k]] += hold.weight[k] * force;
             }
@@ -191,10 +192,10 @@ void LocalYield::find_slopes(const std::vector<MaterialSlope>& numbers) {
     }
 }
 
-// The yield s = A P^T N takes N^T P A P^T N / 2; with forces N(d - P s, p) and K = N' the slopes are ds = (1 + A P^T K P)^-1 (A' P^T N + A P^T N_p)
-// and dN = N_p - K P ds. That of the energy with s as it is: -N^T P A' P^T N / 2.
-LocalYield::Slope LocalYield::slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces, const std::vector<MaterialSlope>& numbers,
-                                    std::size_t number) {
+// The yield s = A P^T N takes N^T P A P^T N / 2; with forces N(d - P s, p) and K = N' the slopes are
+// ds = (1 + A P^T K P)^-1 (A' P^T N + A P^T N_p) and dN = N_p - K P ds. That of the energy with s as it is: -N^T P A' P^T N / 2.
+LocalYield::Slope LocalYield::slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces,
+                                    const std::vector<MaterialSlope>& numbers, std::size_t number) {
     find_slopes(numbers);
     Eigen::VectorXd force = Eigen::VectorXd::Zero(stations()), direct = force;
     Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(stations(), stations());

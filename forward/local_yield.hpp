@@ -7,19 +7,20 @@
 
 namespace crampfit {
 
-/// How much more the wood yields under a wheel than the grid says. A wheel touches a few cells, which have one wood each on average and
-/// a surface that bends at nodes alone: as it rolls over an edge of latewood, the wedge sample on cells of 0.1 mm is opened 2.5 % too
-/// far and G is 5 % too high. So a box about the outline that it may touch is cut out, its sides within the specimen held, and solved
-/// for loads along the outline with cells as they are and a quarter as wide. The difference of the yields, short of range (Saint-Venant),
-/// goes between wheel and grid as a spring does (local defect correction, Hackbusch 1984). Small strain, without cracks.
+/// How much more the wood yields under a wheel than the grid says. A wheel touches a few cells, which have one wood each on
+/// average and a surface that bends at nodes alone: as it rolls over an edge of latewood, the wedge sample on cells of 0.1 mm is
+/// opened 2.5 % too far and G is 5 % too high. So a box about the outline that it may touch is cut out, its sides within the
+/// specimen held, and solved for loads along the outline with cells as they are and a quarter as wide. The difference of the
+/// yields, short of range (Saint-Venant), goes between wheel and grid as a spring does (local defect correction, Hackbusch 1984).
+/// Small strain, without cracks.
 ///
 /// Loads and yields are those of stations along the outline, a fine cell apart, along its normal; linear from one to the next.
 class LocalYield {
   public:
-    /// Of facets whose middles lie in `where`. Null where these are none, or nothing of the box would be held. `whole`, `plan`, `wood` and `body`
-    /// must outlive this.
-    static std::shared_ptr<LocalYield> about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan, const MaterialMap& wood,
-                                             const Discretisation& body);
+    /// Of facets whose middles lie in `where`. Null where these are none, or nothing of the box would be held. `whole`, `plan`,
+    /// `wood` and `body` must outlive this.
+    static std::shared_ptr<LocalYield> about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan,
+                                             const MaterialMap& wood, const Discretisation& body);
 
     static constexpr int finer = 4;  // cells a side in place of one
 
@@ -27,7 +28,9 @@ class LocalYield {
         int station;     // its share is 1 - share; that of the next one `share`
         double share;
     };
-    bool holds(int facet) const { return facet >= first_ && facet < first_ + static_cast<int>(places_.size()) && places_[facet - first_].station >= 0; }
+    bool holds(int facet) const {
+        return facet >= first_ && facet < first_ + static_cast<int>(places_.size()) && places_[facet - first_].station >= 0;
+    }
     const Place& place(int facet) const { return places_[facet - first_]; }
     int stations() const { return static_cast<int>(yield_.rows()); }
 
@@ -41,7 +44,8 @@ class LocalYield {
     };
 
     /// With those of the forces, the yield as it is [touches] [N / unit].
-    Slope slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces, const std::vector<MaterialSlope>& numbers, std::size_t number);
+    Slope slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces, const std::vector<MaterialSlope>& numbers,
+                std::size_t number);
 
   private:
     struct Solved;  // the box on one grid
