@@ -1,7 +1,12 @@
-// Speed of the forward solver. `items_per_second` is material-point steps a second on one core.
+// Speed of the forward solver. Of explicit dynamics `items_per_second` is material-point steps a second on one core; at
+// equilibrium the time is that of a whole run.
 #include "forward/explicit.hpp"
+#include "forward/kept_walk.hpp"
 
 #include <benchmark/benchmark.h>
+
+#include <fstream>
+#include <string>
 
 namespace {
 
@@ -51,6 +56,17 @@ void step_wood(benchmark::State& state, bool crack) {
 void wood_without_crack(benchmark::State& state) { step_wood(state, false); }
 void wood_with_crack_and_J(benchmark::State& state) { step_wood(state, true); }
 
+// What Linux says of this process's memory: VmRSS, or VmHWM, its largest since the mark was wiped [bytes]; 0 elsewhere.
+double memory(const std::string& what) {
+    std::ifstream status("/proc/self/status");
+    std::string key;
+    for (double kilobytes; status >> key; status.ignore(1000, '\n'))
+        if (key == what + ":" && status >> kilobytes) return 1024.0 * kilobytes;
+    return 0.0;
+}
+
+void wipe_mark() { std::ofstream("/proc/self/clear_refs") << 5; }
+
 // A block of earlywood that one side pulls, in finite rotation: cells a side, threads.
 void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate update) {
     Scene scene = wood(static_cast<int>(state.range(0)), false);
@@ -58,15 +74,40 @@ void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate 
     scene.specimen.material = "EW";
     scene.solver.shape_function = shape;
     scene.solver.velocity_update = update;
+    wipe_mark();
+    const double before = memory("VmRSS");
     const MaterialMap materials(scene);
     Discretisation body(scene, materials);
     const Plan plan = make_plan(scene, materials, body);
     ExplicitSolver solver(scene, plan, materials, body, static_cast<int>(state.range(1)));
     for (auto _ : state) solver.step();
+    state.counters["bytes_a_point"] = (memory("VmRSS") - before) / body.points.count();
+    state.counters["most_bytes_a_point"] = (memory("VmHWM") - before) / body.points.count();  // while it was built
     state.SetItemsProcessed(state.iterations() * body.points.count());
     state.counters["points"] = body.points.count();
 }
 
+// At equilibrium a crack runs across the whole specimen: cells a side, threads, and by how many numbers of the woods derivatives
+// are asked for (those by toughness come from the same walk).
+void crack_across_wood(benchmark::State& state) {
+    Scene scene = wood(static_cast<int>(state.range(0)), true);
+    scene.edges[0].velocity = {0.0, 1e-3 / 60.0};
+    scene.cracks[0].advance = 0.2e-3;
+    scene.stop.displacement.reset();
+    scene.stop.crack_length = 10e-3;
+    const std::vector<std::string> moduli{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu"};
+    const std::vector<std::string> numbers(moduli.begin(), moduli.begin() + state.range(2));
+    for (auto _ : state) {
+        const Record record = KeptWalk(scene, numbers, static_cast<int>(state.range(1))).run(scene, {});
+        state.counters["points"] = static_cast<double>(record.points);
+        state.counters["equilibria"] = static_cast<double>(record.steps);
+        const bool ended = record.status == RunStatus::split || record.status == RunStatus::finished;
+        if (!ended) state.SkipWithError(record.message.c_str());
+    }
+}
+
+BENCHMARK(crack_across_wood)->Args({92, 1, 0})->Args({92, 1, 4})->Args({368, 2, 0})->Iterations(1)->Unit(benchmark::kSecond)
+    ->MeasureProcessCPUTime();
 BENCHMARK_CAPTURE(elastic_block, gimp, ShapeFunction::gimp, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, splines, ShapeFunction::bspline2, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, flip, ShapeFunction::gimp, VelocityUpdate::flip)->Args({500, 1})->UseRealTime();

@@ -22,7 +22,7 @@ namespace {
 struct Arguments {
     std::filesystem::path image, output, borders, preview;
     std::filesystem::path density, direction;
-    std::string pixel, scale, growth = "auto";
+    std::string pixel, scale, pith, growth = "auto";
     std::vector<std::string> gray;
     int classes = 2;
 };
@@ -42,6 +42,16 @@ double pixel_by_two_points(const std::string& text) {
     const double apart = std::hypot(x[2] - x[0], x[3] - x[1]);
     const double length = parse_quantity(trim(text.substr(equals + 1)), dimension::length, {"command line", "--scale"});
     return std::isfinite(apart) && apart > 0 && length > 0 ? length / apart : fail();
+}
+
+/// A place in pixels, as in "120,80".
+Vec2 place_of(const std::string& text) {
+    Vec2 place;
+    int read = 0;
+    if (std::sscanf(text.c_str(), " %lf , %lf %n", &place.x(), &place.y(), &read) != 2 || read != static_cast<int>(text.size()) ||
+        !place.allFinite())
+        throw InputError("command line", "--pith", text, "must be \"fit\" or a place in pixels, as in \"-300,150\"");
+    return place;
 }
 
 /// A class by its grays, as in "EW 128-255".
@@ -80,6 +90,9 @@ SegmentOptions options_of(const Arguments& arguments) {
     if (!arguments.density.empty())
         options.density = read_density_table(arguments.density);
     options.direction = arguments.direction;
+    options.fit_pith = arguments.pith == "fit";
+    if (!arguments.pith.empty() && !options.fit_pith)
+        options.pith = place_of(arguments.pith);
     if (!arguments.borders.empty())
         options.borders = read_borders(arguments.borders);
     return options;
@@ -131,6 +144,9 @@ Verb segment_verb(CLI::App& command, const CommonOptions& common) {
     verb->add_option("--density", arguments->density, "Table gray,density [kg/m^3]: the specimen gets a map of its density")
         ->type_name("CAL.csv");
     verb->add_option("--direction", arguments->direction, "Second picture, as large, to see the radial direction in")->type_name("IMAGE");
+    verb->add_option("--pith", arguments->pith,
+                     "Radial directions away from here, as in \"-300,150\" pixels, or \"fit\": from where they fit best")
+        ->type_name("fit|X,Y");
     verb->add_option("--classes", arguments->classes, "2: EW and LW; 3: transition wood between them, too")
         ->check(CLI::IsMember({2, 3}))
         ->excludes(ranges);

@@ -269,16 +269,24 @@ void CrackFields::sort_points(int crack, const Box& window) {
     const Layout& layout = body_->layout;
     Points& points = body_->points;
     const std::uint8_t bit = static_cast<std::uint8_t>(1u << crack);
+    struct Node {
+        bool left, split;
+    };
+    std::vector<std::optional<Node>> known(layout.nodes());  // several cells ask
+    std::vector<bool> left;                                  // [points of a cell]
     body_->for_cells_in(window, [&](int c) {
         const auto nodes = layout.cell_nodes(c);
+        const int first = points.first_of_cell[c], last = points.first_of_cell[c + 1];
+        left.clear();
+        for (int p = first; p < last; ++p) left.push_back(is_left(crack, points.position[p]));
         for (int k = 0; k < layout.nodes_per_cell(); ++k) {
-            const bool node_left = is_left(crack, layout.node_position(nodes[k]));
-            const bool split = freed(crack, nodes[k]) >= least_freed_;
-            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-                const bool apart = is_left(crack, points.position[p]) != node_left && !beyond_wall(crack, points.position[p]);
+            std::optional<Node>& node = known[nodes[k]];
+            if (!node) node = {is_left(crack, layout.node_position(nodes[k])), freed(crack, nodes[k]) >= least_freed_};
+            for (int p = first; p < last; ++p) {
+                const bool apart = left[p - first] != node->left && !beyond_wall(crack, points.position[p]);
                 std::uint8_t& mask = mask_[p][k];
                 const bool was_apart = mask & bit;
-                mask = static_cast<std::uint8_t>(apart && (split || was_apart) ? mask | bit : mask & ~bit);
+                mask = static_cast<std::uint8_t>(apart && (node->split || was_apart) ? mask | bit : mask & ~bit);
                 points.node[p][k] = field(nodes[k], mask, crack);
             }
         }

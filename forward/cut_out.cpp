@@ -25,12 +25,27 @@ Scene scene_in(const Scene& whole, const Box& box, double cell) {
     return scene;
 }
 
+// The part of a crack that a place in a box can be nearest to: the crack runs through it.
+std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
+    const Vec2 reach = Vec2::Constant((box.high - box.low).norm());
+    const Box about{box.low - reach, box.high + reach};
+    const auto counts = [&](std::size_t k) {
+        return about.touches({points[k].cwiseMin(points[k + 1]), points[k].cwiseMax(points[k + 1])});
+    };
+    std::size_t first = 0, last = points.size() - 2;
+    while (first < last && !counts(first)) ++first;
+    while (last > first && !counts(last)) --last;
+    return {points.begin() + static_cast<std::ptrdiff_t>(first), points.begin() + static_cast<std::ptrdiff_t>(last) + 2};
+}
+
 } // namespace
 
 int GridView::point_beside(const Vec2& x) const {
-    int nearest = -1;
-    double least = INFINITY;
     const bool left = cracks.is_left(crack, x);
+    int nearest = body.point_at(x);
+    if (nearest >= 0 && cracks.is_left(crack, body.points.position[nearest]) == left) return nearest;  // most often
+    nearest = -1;
+    double least = INFINITY;
     body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
             const double distance = (body.points.position[p] - x).squaredNorm();
@@ -42,79 +57,120 @@ int GridView::point_beside(const Vec2& x) const {
     return nearest;
 }
 
-CutOut::CutOut(const Scene& whole, const Plan& plan, const MaterialMap& wood, const std::vector<MaterialSlope>& numbers, const Box& place,
-               double cell)
-    : whole_(whole), plan_(plan), numbers_(numbers), box_(place), scene_(scene_in(whole, place, cell)), materials_(wood.part(place.low)),
-      body_(scene_, materials_), cracked_(body_) {
-    hold_outline(whole.specimen.size);
-}
-
-// The sides that are not the specimen's own, where there is wood at them.
-void CutOut::hold_outline(const Vec2& size) {
-    const Vec2 hair = 1e-6 * size;
+CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell)
+    : box(place), scene(scene_in(whole, place, cell)), materials(wood.part(place.low)), body(scene, materials) {
+    // The sides that are not the specimen's own are held, where there is wood at them.
+    const Vec2 size = whole.specimen.size, hair = 1e-6 * size;
     const auto hold = [&](Side side, int axis, bool high) {
-        const double end = high ? body_.layout.size()[axis] : 0.0;
-        for (int p = 0; p < body_.points.count(); ++p) {
-            const Box domain = body_.domain(p);
+        const double end = high ? body.layout.size()[axis] : 0.0;
+        for (int p = 0; p < body.points.count(); ++p) {
+            const Box domain = body.domain(p);
             if (std::abs((high ? domain.high : domain.low)[axis] - end) > hair[axis]) continue;
-            scene_.edges.push_back({"", side, {}, {0.0, 0.0}, {}, {}});
+            scene.edges.push_back({"", side, {}, {0.0, 0.0}, {}, {}});
             return;
         }
     };
-    if (box_.low.x() > hair.x()) hold(Side::left, 0, false);
-    if (box_.high.x() < size.x() - hair.x()) hold(Side::right, 0, true);
-    if (box_.low.y() > hair.y()) hold(Side::bottom, 1, false);
-    if (box_.high.y() < size.y() - hair.y()) hold(Side::top, 1, true);
+    if (box.low.x() > hair.x()) hold(Side::left, 0, false);
+    if (box.high.x() < size.x() - hair.x()) hold(Side::right, 0, true);
+    if (box.low.y() > hair.y()) hold(Side::bottom, 1, false);
+    if (box.high.y() < size.y() - hair.y()) hold(Side::top, 1, true);
 }
 
-bool CutOut::solve(const CrackLine& line, int crack, const GridView& from) {
-    scene_.cracks = {whole_.cracks[crack]};
-    scene_.cracks[0].points = line.points;
-    for (Vec2& x : scene_.cracks[0].points) x -= box_.low;
-    cracked_ = body_;
-    equilibrium_.emplace(scene_, plan_, materials_, cracked_);
-    outline_.clear();
+const std::vector<MaterialSlope>& CutOutWood::slopes_by(const std::vector<MaterialSlope>& numbers) {
+    if (slopes_.empty())
+        for (const MaterialSlope& number : numbers) slopes_.emplace_back(number, body, box.low);
+    return slopes_;
+}
+
+CutOut::CutOut(const Scene& whole, const Plan& plan, const std::vector<MaterialSlope>& numbers, std::shared_ptr<CutOutWood> wood)
+    : whole_(whole), plan_(plan), numbers_(numbers), wood_(std::move(wood)), scene_(wood_->scene), cracked_(wood_->body) {}
+
+std::optional<std::vector<Vec2>> CutOut::way_to(const CrackLine& line, int crack, bool at_end) const {
+    const std::size_t known = points_.size();
+    if (crack_ != crack || line.points.size() < known) return std::nullopt;
+    const auto nth = [&](const std::vector<Vec2>& points, std::size_t k) {
+        return at_end ? points[k] : points[points.size() - 1 - k];
+    };
+    for (std::size_t k = 0; k + 1 < known; ++k)
+        if (nth(points_, k) != nth(line.points, k)) return std::nullopt;
+    // A crack that goes straight on has its last point moved.
+    const Vec2 before = nth(points_, known - 2), tip = nth(points_, known - 1), further = nth(line.points, known - 1);
+    const Vec2 along = (tip - before).normalized(), step = further - tip;
+    if (std::abs(cross(along, step)) > 1e-9 * (further - before).norm() || along.dot(step) < 0.0) return std::nullopt;
+    std::vector<Vec2> way;
+    if (further != tip) way.push_back(further);
+    for (std::size_t k = known; k < line.points.size(); ++k) way.push_back(nth(line.points, k));
+    if (!way.empty() && !(equilibrium_->cracks().lines[0].tip(at_end).inside && line.tip(at_end).inside)) return std::nullopt;
+    return way;
+}
+
+bool CutOut::solve(const CrackLine& line, int crack, bool at_end, const GridView& from, bool solved_there) {
+    if (const auto way = way_to(line, crack, at_end)) {
+        for (const Vec2& to : *way) equilibrium_->grow(0, at_end, to - wood_->box.low);
+    } else {
+        scene_.cracks = {whole_.cracks[crack]};
+        scene_.cracks[0].points = part_about(line.points, wood_->box);
+        for (Vec2& x : scene_.cracks[0].points) x -= wood_->box.low;
+        cracked_ = wood_->body;
+        equilibrium_.emplace(scene_, plan_, wood_->materials, cracked_);
+    }
+    crack_ = crack;
+    points_ = line.points;
+    return take_over(from, solved_there);
+}
+
+// Holds the outline where the other grid has it and solves, or takes all from there.
+bool CutOut::take_over(const GridView& from, bool solved_there) {
+    taken_.clear();
+    solved_there_ = solved_there;
+    const Layout& layout = cracked_.layout;
     const CrackFields& cracks = equilibrium_->cracks();
     std::vector<bool> is_held(cracks.fields(), false);
     for (const Boundary::Held& h : equilibrium_->boundary().held) is_held[h.field] = true;
     std::vector<bool> unknown = is_held;
     // All else follows, but crack faces that begin closed would count as closed.
     for (const FieldPair& pair : cracks.pairs) unknown[pair.left] = unknown[pair.right] = true;
+    if (solved_there) unknown.assign(cracks.fields(), true);
     std::vector<Vec2> displacement(cracks.fields(), Vec2::Zero());
-    const Vec2 shift = box_.low - from.origin;
-    const int nodes = body_.layout.nodes_per_cell();
+    const Vec2 shift = wood_->box.low - from.origin;
+    const int nodes = layout.nodes_per_cell();
     for (int p = 0; p < cracked_.points.count(); ++p) {
         for (const int field : cracked_.points.node[p].first(nodes)) {
             if (!unknown[field]) continue;
             unknown[field] = false;  // once is enough
             // As the wood beside the node moves, on its side of the crack.
-            const int other = from.point_beside(cracked_.points.position[p] + shift);
+            const Vec2 place = cracked_.points.position[p] + shift;
+            const int other = solved_there ? from.body.point_at(place) : from.point_beside(place);
             if (other < 0) return false;
-            const Vec2 x = body_.layout.node_position(cracks.node_of_field[field]) + shift;
+            const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
             Hold hold{field, {}, from.body.values_at(from.body.points.cell[other], x)};
             for (int k = 0; k < nodes; ++k) {
                 hold.from[k] = from.body.points.node[other][k];
                 displacement[field] += hold.weight[k] * from.displacement[hold.from[k]];
             }
-            if (is_held[field]) outline_.push_back(hold);
+            if (solved_there || is_held[field]) taken_.push_back(hold);
         }
     }
-    return equilibrium_->relax(displacement);
+    if (!solved_there) return equilibrium_->relax(displacement);
+    equilibrium_->set_displacements(displacement, 0.0);
+    return true;
 }
 
 std::vector<Vec2> CutOut::slope_by(const GridView& from, const std::vector<Vec2>& inner, double sign, std::vector<double>& by_number) {
-    if (slopes_.empty())
-        for (const MaterialSlope& number : numbers_) slopes_.emplace_back(number, body_, box_.low);
-    const Equilibrium::Slopes slopes = equilibrium_->slopes(slopes_);
-    const Equilibrium::Motion yielding = equilibrium_->yield_to(inner);
-    for (std::size_t n = 0; n < slopes_.size(); ++n)
-        by_number[n] += sign * (slopes.potential[n] - slopes.along(yielding, static_cast<int>(n)));
+    const std::vector<MaterialSlope>& numbers = wood_->slopes_by(numbers_);
+    const Equilibrium::Slopes slopes = equilibrium_->slopes(numbers);
+    for (std::size_t n = 0; n < numbers.size(); ++n) by_number[n] += sign * slopes.potential[n];
     std::vector<Vec2> pull = equilibrium_->out_of_balance_forces();
-    equilibrium_->set_displacements(yielding.fields, 0.0);
-    for (std::size_t f = 0; f < pull.size(); ++f) pull[f] = inner[f] + equilibrium_->out_of_balance_forces()[f] - pull[f];
+    for (Vec2& f : pull) f *= -1.0;
+    if (!solved_there_ && !inner.empty()) {
+        const Equilibrium::Motion yielding = equilibrium_->yield_to(inner);
+        for (std::size_t n = 0; n < numbers.size(); ++n) by_number[n] -= sign * slopes.along(yielding, static_cast<int>(n));
+        equilibrium_->set_displacements(yielding.fields, 0.0);
+        for (std::size_t f = 0; f < pull.size(); ++f) pull[f] += inner[f] + equilibrium_->out_of_balance_forces()[f];
+    }
     std::vector<Vec2> slope(from.displacement.size(), Vec2::Zero());
-    for (const Hold& hold : outline_)
-        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) slope[hold.from[k]] += hold.weight[k] * pull[hold.field];
+    for (const Hold& hold : taken_)
+        for (int k = 0; k < cracked_.layout.nodes_per_cell(); ++k) slope[hold.from[k]] += hold.weight[k] * pull[hold.field];
     return slope;
 }
 

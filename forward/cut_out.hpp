@@ -2,6 +2,7 @@
 
 #include "forward/equilibrium.hpp"
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -19,27 +20,49 @@ struct GridView {
     int point_beside(const Vec2& x) const;
 };
 
-/// A box cut out of the specimen, in cells of its own, with one of its cracks; its outline is held where another grid has it. Its wood is
-/// taken once, for all places of the tip.
+/// The wood of a box of the specimen in cells of its own, without a crack: found once for all cracks there.
+struct CutOutWood {
+    CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell);
+
+    bool is(const Box& place, double width) const {
+        return place.low == box.low && place.high == box.high && width == scene.model.cell;
+    }
+    const std::vector<MaterialSlope>& slopes_by(const std::vector<MaterialSlope>& numbers);
+
+    Box box;                               // in the specimen
+    Scene scene;                           // of what is cut out; its outline is held where the specimen goes on
+    MaterialMap materials;
+    Discretisation body;
+
+  private:
+    std::vector<MaterialSlope> slopes_;    // of the numbers here; empty: not asked for yet
+};
+
+/// A box cut out of the specimen with one of its cracks; its outline is held where another grid has it. A crack that goes on takes along
+/// what it leaves as it is: its fields and most of the factor.
 class CutOut {
   public:
     /// `whole`, `plan` and `numbers`, those of the materials by which slopes may be asked for, must outlive this.
-    CutOut(const Scene& whole, const Plan& plan, const MaterialMap& wood, const std::vector<MaterialSlope>& numbers, const Box& place, double cell);
+    CutOut(const Scene& whole, const Plan& plan, const std::vector<MaterialSlope>& numbers, std::shared_ptr<CutOutWood> wood);
 
-    bool is(const Box& place, double cell) const { return place.low == box_.low && place.high == box_.high && cell == scene_.model.cell; }
+    const std::shared_ptr<CutOutWood>& wood() const { return wood_; }
 
-    /// Solves with this crack. False where the other grid does not know the outline.
-    bool solve(const CrackLine& line, int crack, const GridView& from);
+    /// Where the tip goes from the crack that was solved for last to this one [m]: nowhere if that is the same. None where it is another.
+    std::optional<std::vector<Vec2>> way_to(const CrackLine& line, int crack, bool at_end) const;
+
+    /// Solves with this crack. False where the other grid does not know the outline. `solved_there`: in the same cells, so that what the
+    /// other grid has there is the solution.
+    bool solve(const CrackLine& line, int crack, bool at_end, const GridView& from, bool solved_there);
 
     double potential() const { return equilibrium_->potential(); }  // [J]
-    GridView view() const { return {cracked_, equilibrium_->cracks(), equilibrium_->displacements(), box_.low, 0}; }
+    GridView view() const { return {cracked_, equilibrium_->cracks(), equilibrium_->displacements(), wood_->box.low, 0}; }
 
     /// Slope of the energy by the displacements of the other grid, with `inner` that of what is cut out of this one by its
-    /// displacements [N]. Adds `sign` times the slopes by the numbers.
+    /// displacements [N], empty where nothing is cut out. Adds `sign` times the slopes by the numbers.
     std::vector<Vec2> slope_by(const GridView& from, const std::vector<Vec2>& inner, double sign, std::vector<double>& by_number);
 
   private:
-    void hold_outline(const Vec2& size);
+    bool take_over(const GridView& from, bool solved_there);
 
     struct Hold {
         int field;
@@ -50,13 +73,14 @@ class CutOut {
     const Scene& whole_;
     const Plan& plan_;
     const std::vector<MaterialSlope>& numbers_;
-    Box box_;                              // in the specimen
-    Scene scene_;                          // of what is cut out and the crack
-    MaterialMap materials_;
-    Discretisation body_, cracked_;        // without the crack and with it
-    std::vector<MaterialSlope> slopes_;    // of the numbers here; empty: not asked for yet
+    std::shared_ptr<CutOutWood> wood_;
+    Scene scene_;                          // with the crack
+    Discretisation cracked_;
     std::optional<Equilibrium> equilibrium_;
-    std::vector<Hold> outline_;
+    int crack_ = -1;                       // that it holds, by its number in the specimen; -1: none yet
+    std::vector<Vec2> points_;             // of that crack, in the specimen [m]
+    std::vector<Hold> taken_;              // the outline, or all that is solved there
+    bool solved_there_ = false;
 };
 
 } // namespace crampfit

@@ -64,6 +64,7 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
     for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
     least_force_ = least_strain * stiffest * body.layout.cell.maxCoeff() * body.layout.thickness;
     find_free_bodies();
+    if (!cracks_.lines.empty()) find_pieces(true);
     renumber();
     find_forces();
 }
@@ -106,12 +107,20 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
         if (!settled_.empty()) settled_.push_back(settled_[from]);
     boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
-    // A tip that ends may cut a piece free; where bodies slide, contact decides what can move.
-    if (sliding_.empty() && (!cracks_.lines[crack].tip(at_end).inside || !pieces_.holds.empty()))
-        pieces_ = find_loose_pieces(body_, cracks_, boundary_, field_masses(body_, cracks_.fields()));
+    // A tip that ends may cut a piece free.
+    if (!cracks_.lines[crack].tip(at_end).inside || !pieces_.holds.empty()) find_pieces(false);
     renumber();
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
+}
+
+// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for crumbs,
+// lighter than a cell, between cracks that cross.
+void Equilibrium::find_pieces(bool crumbs_only) {
+    if (!sliding_.empty()) return;
+    const std::vector<double> mass = field_masses(body_, cracks_.fields());
+    const double heaviest = crumbs_only ? *std::ranges::max_element(mass) : std::numeric_limits<double>::infinity();
+    pieces_ = find_loose_pieces(body_, cracks_, boundary_, mass, heaviest);
 }
 
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {

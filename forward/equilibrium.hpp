@@ -151,6 +151,7 @@ class Equilibrium {
     Drag face_drag(std::size_t pair) const;
     std::vector<Vec2> face_forces() const;
     void find_free_bodies();
+    void find_pieces(bool crumbs_only);
     void seat(int sliding);
     void settle();
     void set_contacts(const Contacts& contacts);

@@ -71,16 +71,21 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     slope.fields = Eigen::MatrixXd::Zero(2 * displacement_.size(), numbers.size());
     slope.drivers = Eigen::MatrixXd::Zero(2 * boundary_.drivers(), numbers.size());
     const auto add = [&](std::size_t n, int field, const Vec2& force) { slope.fields.col(n).segment<2>(2 * field) += force; };
-    for (int p = 0; p < points.count(); ++p) {
-        const auto changes = [&](const MaterialSlope& number) { return !number.stiffness(points.cell[p]).isZero(0.0); };
-        if (std::none_of(numbers.begin(), numbers.end(), changes)) continue;
-        const Mat2 gradient = gradient_at(body_, p, displacement_);
-        const CellWeights& w = body_.weights[points.slot[p]];
-        for (std::size_t n = 0; n < numbers.size(); ++n) {
-            if (!changes(numbers[n])) continue;
-            const PointState state = elastic_state(gradient, numbers[n].stiffness(points.cell[p]), plan_.rotates);
-            slope.potential[n] += points.volume[p] * state.energy;
-            for (int k = 0; k < 4; ++k) add(n, points.node[p][k], points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k])));
+    std::vector<std::size_t> change;  // numbers that change the wood of a cell
+    for (int c = 0; c < body_.layout.cells(); ++c) {
+        change.clear();
+        for (std::size_t n = 0; n < numbers.size(); ++n)
+            if (!numbers[n].stiffness(c).isZero(0.0)) change.push_back(n);
+        if (change.empty()) continue;
+        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
+            const Mat2 gradient = gradient_at(body_, p, displacement_);
+            const CellWeights& w = body_.weights[points.slot[p]];
+            const auto node = points.node[p];
+            for (const std::size_t n : change) {
+                const PointState state = elastic_state(gradient, numbers[n].stiffness(c), plan_.rotates);
+                slope.potential[n] += points.volume[p] * state.energy;
+                for (int k = 0; k < 4; ++k) add(n, node[k], points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k])));
+            }
         }
     }
     for (const UnevenCells::Piece& piece : internal_force_.uneven().pieces()) {

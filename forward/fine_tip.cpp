@@ -123,11 +123,22 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
     return found;
 }
 
-CutOut& FineTip::cut(const Box& box, double cell) {
-    auto found = std::find_if(kept_.begin(), kept_.end(), [&](const auto& one) { return one->is(box, cell); });
+// The one that has been solved with this crack, or one from whose crack it goes on.
+CutOut& FineTip::cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end) {
+    auto found = kept_.end();
+    std::shared_ptr<CutOutWood> wood;
+    for (auto one = kept_.begin(); one != kept_.end(); ++one) {
+        if (!(*one)->wood()->is(box, cell)) continue;
+        wood = (*one)->wood();
+        const auto way = (*one)->way_to(line, crack, at_end);
+        if (!way || (found != kept_.end() && !way->empty())) continue;
+        found = one;
+        if (way->empty()) break;
+    }
     if (found == kept_.end()) {
+        if (!wood) wood = std::make_shared<CutOutWood>(scene_, materials_, box, cell);
         if (kept_.size() == most_kept) kept_.pop_back();
-        kept_.push_front(std::make_unique<CutOut>(scene_, small_, materials_, numbers_, box, cell));
+        kept_.push_front(std::make_unique<CutOut>(scene_, small_, numbers_, std::move(wood)));
     } else {
         std::rotate(kept_.begin(), found, found + 1);
     }
@@ -158,9 +169,13 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     double cell = std::sqrt(body_.layout.cell.prod());
     MissedEnergy missed;
     for (const Box& box : place.boxes) {
-        coarse.push_back(&cut(box, cell));
-        fine.push_back(&cut(box, 0.5 * cell));
-        if (!coarse.back()->solve(line, crack, views.back()) || !fine.back()->solve(line, crack, views.back())) return {};
+        for (const bool finer : {false, true}) {
+            CutOut& part = cut(box, finer ? 0.5 * cell : cell, line, crack, at_end);
+            // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
+            const bool solved_there = !finer && (!rotates_ || views.size() > 1);
+            if (!part.solve(line, crack, at_end, views.back(), solved_there)) return {};
+            (finer ? fine : coarse).push_back(&part);
+        }
         missed.energy += place.share * (fine.back()->potential() - coarse.back()->potential());
         views.push_back(fine.back()->view());
         cell *= 0.5;
@@ -169,11 +184,10 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
 
     // And up: the slopes.
     missed.by_number.assign(numbers_.size(), 0.0);
-    std::vector<Vec2> slope(views.back().displacement.size(), Vec2::Zero());
+    std::vector<Vec2> slope;  // of the innermost nothing is cut out
     for (std::size_t k = fine.size(); k-- > 0;) {
         slope = fine[k]->slope_by(views[k], slope, place.share, missed.by_number);
-        const std::vector<Vec2> still(coarse[k]->view().displacement.size(), Vec2::Zero());
-        const std::vector<Vec2> less = coarse[k]->slope_by(views[k], still, -place.share, missed.by_number);
+        const std::vector<Vec2> less = coarse[k]->slope_by(views[k], {}, -place.share, missed.by_number);
         for (std::size_t f = 0; f < slope.size(); ++f) slope[f] -= less[f];
     }
     for (const Vec2& s : slope) missed.by_displacement.push_back(place.share * turn * s);

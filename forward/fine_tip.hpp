@@ -47,7 +47,7 @@ class FineTip {
     MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
 
   private:
-    CutOut& cut(const Box& box, double cell);
+    CutOut& cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end);
 
     const Scene& scene_;
     const MaterialMap& materials_;

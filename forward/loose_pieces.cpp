@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <numeric>
 
 namespace crampfit {
@@ -32,32 +33,39 @@ std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks
 } // namespace
 
 LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
-                              const std::vector<double>& mass) {
+                              const std::vector<double>& mass, double heaviest) {
     const std::vector<int> piece = pieces_of(body, cracks, mass);
+    if (std::ranges::none_of(cracks.pairs, [&](const FieldPair& pair) {
+            return mass[pair.left] > 0.0 && mass[pair.right] > 0.0 && piece[pair.left] != piece[pair.right];
+        })) return {};
     // How a component of displacement goes with a piece's ways to move as a whole: along x, along y, and turning.
     const double size = body.layout.size().maxCoeff();
     const auto motion = [&](int field, int axis) {
         const Vec2 x = body.layout.node_position(cracks.node_of_field[field]) / size - Vec2(0.5, 0.5);
         return axis == 0 ? Eigen::Vector3d(1.0, 0.0, -x.y()) : Eigen::Vector3d(0.0, 1.0, x.x());
     };
-    std::vector<bool> held(2 * piece.size(), false), pulled(piece.size(), false);
+    std::vector<bool> held(2 * piece.size(), false), left_alone(piece.size(), false);
     std::map<int, Eigen::Matrix3d> holds;  // by piece
-    for (std::size_t f = 0; f < piece.size(); ++f)
+    std::vector<double> weight(piece.size(), 0.0);
+    for (std::size_t f = 0; f < piece.size(); ++f) {
+        weight[piece[f]] += mass[f];
         if (mass[f] > 0.0) holds.emplace(piece[f], Eigen::Matrix3d::Zero());
+    }
     for (const Boundary::Held& h : boundary.held) {
         if (mass[h.field] == 0.0) continue;
         held[2 * h.field + h.axis] = true;
         const Eigen::Vector3d row = motion(h.field, h.axis);
         holds.at(piece[h.field]) += row * row.transpose();
     }
-    for (const Boundary::Traction& t : boundary.tractions) pulled[piece[body.points.node[t.facet.point][0]]] = true;
+    for (std::size_t f = 0; f < piece.size(); ++f) left_alone[f] = weight[f] > heaviest;
+    for (const Boundary::Traction& t : boundary.tractions) left_alone[piece[body.points.node[t.facet.point][0]]] = true;
 
     LoosePieces found;
     found.loose.assign(piece.size(), false);
     for (std::size_t f = 0; f < piece.size(); ++f)
-        found.loose[f] = mass[f] > 0.0 && holds.at(piece[f]).isZero(0.0) && !pulled[piece[f]];
+        found.loose[f] = mass[f] > 0.0 && holds.at(piece[f]).isZero(0.0) && !left_alone[piece[f]];
     for (auto& [own, sum] : holds) {
-        while (!pulled[own]) {
+        while (!left_alone[own]) {
             constexpr double nothing = 1e-6;  // squared distance of neighbouring nodes over the specimen's size, and less
             const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> ways(sum);
             if (ways.eigenvalues()[0] > nothing) break;

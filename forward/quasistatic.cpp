@@ -53,7 +53,10 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
                          const std::vector<std::string>& numbers, int threads)
     : Quasistatic(scene, plan, materials, body, numbers, threads, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
-    if (!(plan.linear ? know_linear(0) : know(0, 0) && know(0, 1))) throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+    if (plan.linear ? know_linear(0) : know(0, 0) && know(0, 1)) return;
+    if (outcome_ == Equilibrium::Outcome::mechanism)
+        throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
+    fail();
 }
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
@@ -167,6 +170,9 @@ LoadState Quasistatic::load_state(const Missed& missed) const {
     return state;
 }
 
+// Whether cracks have left the specimen on their way, so that where no equilibrium is found its pieces fly apart.
+bool Quasistatic::parted(std::size_t number) const { return places_[number].station.left && !growing_.empty(); }
+
 // A specimen in pieces that nothing holds together carries nothing.
 LoadState Quasistatic::nothing(double time) const {
     LoadState state;
@@ -197,12 +203,13 @@ bool Quasistatic::know_linear(std::size_t number) {
     const auto follow = [&] { return coarse_->walk.follow_leader(number); };
     const auto solve = [&](int time) {
         ++equilibria_;
-        return equilibrium_.solve(time_of(time)) == Equilibrium::Outcome::solved;
+        outcome_ = equilibrium_.solve(time_of(time));
+        return outcome_ == Equilibrium::Outcome::solved;
     };
     if (!equilibrium_.boundary().has_dead_load()) {  // all goes with the load or its square
         const auto [second, good] = on_both_grids(follow, [&] { return solve(2); });
         if (!second) return false;
-        if (!good && !places_[number].station.left) return false;
+        if (!good && !parted(number)) return false;
         const Missed missed = good ? missed_at(number, !numbers_.empty()) : Missed{};
         const LoadState full = good ? load_state(missed) : nothing(time_of(2));
         if (good) keep_probes(number, 2);
@@ -249,7 +256,8 @@ bool Quasistatic::know_linear(std::size_t number) {
 // when a crack has grown at the same time it falls.
 bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
-    if (equilibrium_.solve(time) != Equilibrium::Outcome::solved) return false;
+    outcome_ = equilibrium_.solve(time);
+    if (outcome_ != Equilibrium::Outcome::solved) return false;
     const double change = equilibrium_.potential() - potential;
     const double rounding = 1e-6 * std::abs(potential);
     if (time == from) return change <= rounding;
@@ -398,7 +406,7 @@ bool Quasistatic::find(std::size_t number, int time) {
         keep_probes(number, time);
         return true;
     }
-    if (!place.station.left) return false;
+    if (!parted(number)) return false;
     keep(number, time, nothing(time_of(time)));
     return true;
 }

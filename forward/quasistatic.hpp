@@ -154,6 +154,7 @@ class Quasistatic {
     void keep_slopes(std::size_t number, int time, Slopes slopes);
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
+    bool goes_with_load(const std::vector<Vec2>& drivers) const;
     std::optional<Slopes> slopes_here(const Missed& missed);
     void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
                     std::vector<LoadState>& slopes) const;
@@ -164,6 +165,7 @@ class Quasistatic {
     Missed missed_at(std::size_t number, bool with_slopes);
     MissedEnergy missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes);
     LoadState load_state(const Missed& missed) const;
+    bool parted(std::size_t number) const;
     LoadState nothing(double time) const;
     double time_of(int number) const { return number * time_step_; }
 
@@ -188,6 +190,7 @@ class Quasistatic {
     int last_time_ = 0;                           // number of the last of them
     std::string failure_;
     int equilibria_ = 0;
+    Equilibrium::Outcome outcome_ = Equilibrium::Outcome::solved;  // of the last one
 
     struct Coarse;                                // the second grid
     std::unique_ptr<Coarse> coarse_;

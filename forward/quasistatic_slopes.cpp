@@ -10,6 +10,24 @@
 
 namespace crampfit {
 
+namespace {
+
+// What one set of vectors times gives another.
+std::optional<double> multiple(const std::vector<Vec2>& wanted, const std::vector<Vec2>& of) {
+    double both = 0.0, square = 0.0, difference = 0.0;
+    for (std::size_t k = 0; k < of.size(); ++k) {
+        both += wanted[k].dot(of[k]);
+        square += of[k].squaredNorm();
+    }
+    if (square == 0.0) return std::nullopt;
+    for (std::size_t k = 0; k < of.size(); ++k) difference = std::max(difference, (wanted[k] - both / square * of[k]).norm());
+    constexpr double rounding = 1e-12;
+    if (difference > rounding * std::abs(both) / std::sqrt(square)) return std::nullopt;
+    return both / square;
+}
+
+} // namespace
+
 // Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know next to
 // nothing.
 void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const {
@@ -43,6 +61,15 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
     if (!shift_.empty()) show_shifted(number, time);
 }
 
+// Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear scene.
+bool Quasistatic::goes_with_load(const std::vector<Vec2>& drivers) const {
+    const Boundary& boundary = equilibrium_.boundary();
+    bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium_.time() > 0.0;
+    const double time = equilibrium_.time();
+    for (int d = 0; d < boundary.drivers() && goes; ++d) goes = boundary.travel(d, time) == time * drivers[d];
+    return goes;
+}
+
 // Derivatives of the state where the equilibrium stands. What is prescribed has none.
 std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed) {
     const Boundary& boundary = equilibrium_.boundary();
@@ -51,8 +78,21 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
     for (int d = 0; d < boundary.drivers(); ++d)
         if (equilibrium_.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
     drives[1][gauges.force] = gauges.force_direction;
-    std::vector<Equilibrium::Motion> motions = equilibrium_.motions(drives);
-    if (motions.empty()) return std::nullopt;
+    std::vector<Equilibrium::Motion> motions;
+    if (goes_with_load(drives[0])) {
+        motions.push_back({drives[0], equilibrium_.displacements()});
+        for (Vec2& u : motions[0].fields) u /= equilibrium_.time();
+        if (const auto factor = multiple(drives[1], drives[0])) {
+            motions.push_back(motions[0]);
+            for (std::vector<Vec2>* of : {&motions[1].drivers, &motions[1].fields})
+                for (Vec2& m : *of) m *= *factor;
+        }
+    }
+    if (motions.size() < drives.size()) {
+        auto others = equilibrium_.motions({drives.begin() + static_cast<std::ptrdiff_t>(motions.size()), drives.end()});
+        if (others.empty()) return std::nullopt;
+        std::move(others.begin(), others.end(), std::back_inserter(motions));
+    }
     const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
     if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
     const Equilibrium::Slopes slope = equilibrium_.slopes(numbers_);

@@ -84,7 +84,7 @@ class Tracer {
     // Takes in the next station: when the crack moves on from it, and what has been spent on the way to it.
     bool know_station(std::size_t i, double now) {
         if (i < critical_.size()) return true;
-        if (!walk_.reach(i, now)) return false;
+        if (!walk_.failure().empty() || !walk_.reach(i, now)) return false;
         double spent = i > 0 ? fracture_energy_.back() : 0.0;
         if (i > 0) {
             const Station& before = walk_.station(i - 1);

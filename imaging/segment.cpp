@@ -6,6 +6,7 @@
 #include "imaging/foreign.hpp"
 #include "imaging/gray_picture.hpp"
 #include "imaging/growth.hpp"
+#include "imaging/pith.hpp"
 #include "imaging/pixels.hpp"
 #include "imaging/resolution_tag.hpp"
 #include "imaging/ring_figures.hpp"
@@ -266,6 +267,22 @@ OrientationField orientation_of(const std::filesystem::path& image, cv::Size siz
     return measure_orientation(pixels.gray, find_blank(pixels.gray, pixels.bgr) == 0, scale);
 }
 
+/// Directions away from the pith, as told or as they fit it best.
+void turn_from_pith(OrientationField& field, cv::Size picture, const SegmentOptions& options, std::vector<std::string>& notes) {
+    if (options.pith)
+        return turn_to_fan(field, fan_from({options.pith->x(), options.pith->y()}, picture));
+    const std::optional<RadialFan> fan = fit_fan(field, picture);
+    if (!fan) {
+        notes.push_back("pith not fitted: the picture shows no directions");
+        return;
+    }
+    turn_to_fan(field, *fan);
+    const auto pith = fan->pith();
+    const std::string where = pith ? fmt::format("fitted at {:.0f},{:.0f} px", pith->x, pith->y) : "nowhere: rings are straight";
+    notes.push_back(fmt::format("pith {}; measured directions lie about those from it by {:.1f} degrees (standard deviation)",
+                                where, 180 / std::numbers::pi * fan->scatter));
+}
+
 void fill_density(Specimen& specimen, const std::filesystem::path& image, const DensityTable& table, std::vector<std::string>& notes) {
     const FinePicture gray = read_fine_gray(image, {"command line", "IMAGE"});
     std::vector<double> sum(specimen.classes.size(), 0.0);
@@ -293,6 +310,8 @@ void SegmentOptions::validate() const {
     };
     require(pixel >= 0 && std::isfinite(pixel), "--pixel", fmt::format("{} m", pixel), "must be a positive length");
     require(classes == 2 || classes == 3, "--classes", std::to_string(classes), "must be 2 or 3");
+    if (pith)
+        require(pith->allFinite(), "--pith", fmt::format("{},{}", pith->x(), pith->y()), "must be a place in pixels");
     for (const GrayClass& range : gray) {
         const std::string text = fmt::format("{} {}-{}", range.material, range.low, range.high);
         require(range.low >= 0 && range.low <= range.high && range.high <= 255, "--gray", text, "must be 0 <= low <= high <= 255");
@@ -330,10 +349,12 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     } else {
         classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
     }
-    if (options.direction.empty())
-        turn_to_borders(second.orientation, second.borders, frame, width);
-    else
+    if (!options.direction.empty())
         second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
+    if (options.fit_pith || options.pith)
+        turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);
+    else if (options.direction.empty())
+        turn_to_borders(second.orientation, second.borders, frame, width);
     fill_maps(specimen, second, classes, frame);
     if (options.density)
         fill_density(specimen, image, *options.density, result.notes);

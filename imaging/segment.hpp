@@ -22,6 +22,8 @@ struct SegmentOptions {
     std::optional<DensityTable> density = std::nullopt;  // what the picture's own gray stands for
     int threads = 0;               // of OpenCV in this process; 0: as they are
     std::filesystem::path direction = {};      // picture of the same wood, as large, that the radial direction is seen in; empty: the same
+    bool fit_pith = false;         // radial directions away from the place that they fit best
+    std::optional<Vec2> pith = std::nullopt;  // or away from here [pixels]
 
     /// Throws InputError for anything out of range.
     void validate() const;

@@ -1,5 +1,6 @@
 #include "imaging/wood_classes.hpp"
 
+#include "imaging/border_edges.hpp"
 #include "imaging/quantile.hpp"
 
 #include <opencv2/imgproc.hpp>
@@ -60,8 +61,9 @@ class RingProfile {
         sum_[i] += gray;
         ++count_[i];
     }
-    /// The brightest and the darkest of its means over a few steps, or of what these tend to at the borders: EW may darken from its very beginning.
-    WoodLevels extremes() const {
+    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very beginning. Where an end
+    /// is not known it is what the means tend to there.
+    WoodLevels extremes(const std::optional<BorderGrays>& inner, const std::optional<BorderGrays>& outer) const {
         const std::size_t n = sum_.size(), reach = n / 40;
         std::vector<cv::Point2d> means;  // over the place in the ring, in steps
         for (std::size_t i = 0; i < n; ++i) {
@@ -78,8 +80,10 @@ class RingProfile {
         const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
         WoodLevels levels{bright.y, dark.y};
         if (means.size() >= 2 * some) {
-            levels.earlywood = std::max(levels.earlywood, line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)}));
-            levels.latewood = std::min(levels.latewood, line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()}));
+            const double begin = line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)});
+            const double end = line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()});
+            levels.earlywood = std::max(levels.earlywood, inner ? inner->earlywood : begin);
+            levels.latewood = std::min(levels.latewood, outer ? outer->latewood : end);
         }
         return levels;
     }
@@ -92,7 +96,10 @@ class RingProfile {
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
-    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const BorderLine& inner, const BorderLine& outer, int stretch) {
+    /// The ring between border `ring` - 1 and border `ring`.
+    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, const BorderEdges& edges, std::size_t ring,
+               int stretch) {
+        const BorderLine &inner = borders[ring - 1], &outer = borders[ring];
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         for (int k = 0; k < count; ++k) {
@@ -114,7 +121,8 @@ class RingLevels {
             if (grays.size() < least_pixels)
                 continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            levels_.push_back(profile->extremes());
+            const int middle = (begin + end) / 2;
+            levels_.push_back(profile->extremes(edges.at(ring - 1, middle), edges.at(ring, middle)));
             ranges_.push_back({quantile(grays, bright_share), quantile(grays, dark_share)});
         }
     }
@@ -232,10 +240,11 @@ cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
 cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
                        const std::vector<BorderLine>& borders, double ring_width, WoodLevels& range) {
     const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
+    const BorderEdges edges(smooth, valid, borders, ring_width);
     std::vector<RingLevels> whole;          // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        RingLevels ring(smooth, valid, borders[i - 1], borders[i], std::max(40, static_cast<int>(ring_width)));
+        RingLevels ring(smooth, valid, borders, edges, i, std::max(40, static_cast<int>(ring_width)));
         if (!ring.empty()) {
             nearest_whole[i] = static_cast<int>(whole.size());
             whole.push_back(std::move(ring));

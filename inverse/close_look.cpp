@@ -62,16 +62,34 @@ bool take_profile(CloseLook& look) {
     const double level = u.quantile * u.quantile * u.widening;
     Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
     for (Eigen::Index j = 0; j < lower.size(); ++j) {
-        constexpr double coarse = 0.1;  // of the window: twice the profile's steps
-        const Profile profile = profile_likelihood(look.objective, u.best, j, told ? std::sqrt(u.covariance(j, j)) : coarse, level);
-        const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
-        if (ends.first <= 0.0 || ends.second >= 1.0) {
-            return false;
+        double below = 0, above = 0;  // distances
+        const double own = told ? u.quantile * std::sqrt(u.model_variance[j]) : 0.0;
+        if (told) {
+            const double variance = u.covariance(j, j) - u.model_variance[j];
+            const Eigen::VectorXd valley = u.covariance.col(j) / u.covariance(j, j);
+            const auto end = [&](int side) {
+                const double least = look.objective.best()->evaluation->misfit;
+                return profile_end(look.objective, u.best, j, side, u.quantile * std::sqrt(variance), valley, least, level);
+            };
+            const auto low = end(-1), high = low ? end(1) : std::nullopt;
+            if (!high) {
+                return false;
+            }
+            below = *low;
+            above = *high;
+        } else {
+            constexpr double coarse = 0.1;  // of the window: twice the profile's steps
+            const Profile profile = profile_likelihood(look.objective, u.best, j, coarse, level);
+            const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
+            if (ends.first <= 0.0 || ends.second >= 1.0) {
+                return false;
+            }
+            below = u.best.x[j] - ends.first;
+            above = ends.second - u.best.x[j];
         }
         // The model's own scatter, which no profile of it shows, comes on top.
-        const double x = u.best.x[j], own = told ? u.quantile * std::sqrt(u.model_variance[j]) : 0.0;
-        lower[j] = std::max(0.0, x - std::hypot(x - ends.first, own));
-        upper[j] = std::min(1.0, x + std::hypot(ends.second - x, own));
+        lower[j] = std::max(0.0, u.best.x[j] - std::hypot(below, own));
+        upper[j] = std::min(1.0, u.best.x[j] + std::hypot(above, own));
     }
     // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
     u.lower_95 = told ? Eigen::VectorXd(lower.cwiseMin(u.lower_95)) : lower;

@@ -1,6 +1,7 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
+#include "datasets/run_journal.hpp"
 #include "inverse/close_look.hpp"
 #include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
@@ -133,6 +134,20 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
                        : "No run ended well; the first: " + objective.runs().front().evaluation->status;
 }
 
+// All that the lowest point of a cheap model hangs on beyond what the runs do.
+std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
+                            double resolution, unsigned seed) {
+    Fingerprint print;
+    print.add(point).add(resolution).add(rough).add(seed).add(static_cast<double>(study.optimizer.loss));
+    for (const Eigen::VectorXd* end : {&window.low, &window.high}) {
+        print.add(std::vector<double>(end->begin(), end->end()));
+    }
+    for (const Parameter& parameter : study.parameters) {
+        print.add(parameter.lower).add(parameter.upper).add(static_cast<double>(parameter.scale));
+    }
+    return print.value();
+}
+
 const char* explain(FitStatus status) {
     switch (status) {
     case FitStatus::converged:
@@ -175,19 +190,47 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
         };
     };
-    const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(), walks.turn_with_toughness()};
     const UnitBox& box = model.box();
     Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
+    const auto of_point = [&](const Eigen::VectorXd& x) {
+        const Eigen::VectorXd values = box.values(x);
+        return std::vector<double>(values.begin(), values.end());
+    };
+    // What an earlier process has done on walks that hang on one another is done again only where something goes on from them.
+    std::size_t searches = 0;
+    const auto recall = [&](const Eigen::VectorXd& point, const Window& window, bool rough,
+                            const std::function<Lowest()>& search) {
+        const std::size_t n = searches++;
+        const std::uint64_t asked = what_is_asked(study, of_point(point), window, rough, model.resolution(), options.seed);
+        if (const auto before = store.found_by_search(n, asked)) {
+            if (in_order) {
+                walks.put_off(of_point(point), search);
+            }
+            return Lowest{Eigen::Map<const Eigen::VectorXd>(before->data(), box.size()), before->back()};
+        }
+        walks.catch_up(of_point(point));
+        const Lowest found = search();
+        std::vector<double> kept(found.x.begin(), found.x.end());
+        kept.push_back(found.misfit);
+        store.keep_search(n, asked, kept);
+        return found;
+    };
+    const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(),
+                        walks.turn_with_toughness(), recall};
     // Steps on walks go on from the one before, where the walks are.
     Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
                    by_walks || in_order ? nullptr : options.farm);
     Objective objective(
         box.size(), [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = box.values(x);
-            // Runs that go on from one another are made again after a kill: without them the next ones would differ in their last digits.
-            const auto run = [&] { return shared(values, share); };
-            Evaluation evaluation = in_order ? store.again(values, run) : store.at(values, run);
+            const auto run = [&shared, values, share] { return shared(values, share); };
+            if (in_order && store.known(values)) {
+                walks.put_off(of_point(x), run);
+            } else if (in_order) {
+                walks.catch_up(of_point(x));
+            }
+            Evaluation evaluation = store.at(values, run);
             model.weigh(evaluation, values);  // stored ones may have been weighed by another resolution
             return evaluation;
         },
@@ -207,7 +250,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         // How well the model knows what it says shows where it fits.
         const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
         const bool ended_early = round == 0 && enough > 0;
-        if (!ended_early && std::abs(likely - model.resolution()) <= 0.1 * model.resolution()) {
+        if (!ended_early && model.change_of_sigma(likely) <= 0.1) {
             break;
         }
         model.set_resolution(likely);
@@ -241,8 +284,12 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
             }
             const Eigen::VectorXd x = objective.best()->x;
-            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, run_on_wide_cells, std::cref(study), box.values(x),
-                              options.stop_requested);
+            walks.catch_up(of_point(x));
+            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, values = box.values(x)] {
+                Eigen::VectorXd key(values.size() + 1);
+                key << values, 2.0;  // cells so many times as wide
+                return store.at(key, [&] { return run_on_wide_cells(study, values, options.stop_requested); });
+            });
             close = look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed);
             return close ? close->uncertainty : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step);
         };

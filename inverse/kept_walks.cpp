@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <list>
 #include <mutex>
 
 namespace crampfit {
@@ -46,10 +47,17 @@ class KeptWalks::Store {
             const Parameter& parameter = study.parameters[j];
             for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
                 const std::string& key = parameter.keys[k];
-                if (!find_machine_number(study, key, study.file.string(), "(any)")) {  // these change no walk
+                if (find_machine_number(study, key, study.file.string(), "(any)")) {  // these change no walk
+                    walks_tell_all_ = false;
+                } else {
                     const double factor = parameter.factor(k);
                     (key.ends_with(".toughness") ? toughness_ : others_).push_back({key, j, factor, factor * parameter.initial});
                 }
+            }
+        }
+        for (const Setting& setting : others_) {
+            for (const Scene* scene : scenes_) {
+                walks_tell_all_ = walks_tell_all_ && has(*scene, setting.key);
             }
         }
     }
@@ -58,11 +66,35 @@ class KeptWalks::Store {
 
     // On the walk of the scene with other values.
     Record run_near(const std::vector<double>& values, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
-        Scene base = scene;
-        for (const Setting& setting : settings_of_walk(scene)) {
-            set_number(base, setting.key, setting.factor * values[setting.parameter]);
+        return run(at_point(scene, values), scene, rough, stop);
+    }
+
+    void put_off(const std::vector<double>& values, std::function<void()> work) {
+        if (!walks_tell_all_) {
+            work();
+            return;
         }
-        return run(base, scene, rough, stop);
+        for (const Scene* scene : scenes_) {  // the walks are dropped when they would have been
+            const std::lock_guard lock(mutex_);
+            entry_of(name_of(of_walk(at_point(*scene, values))));
+        }
+        put_off_.push_back({name_of(of_walk(at_point(*scenes_.front(), values))), std::move(work)});
+    }
+
+    void catch_up(const std::vector<double>& values) {
+        if (put_off_.empty()) {
+            return;
+        }
+        const std::string name = name_of(of_walk(at_point(*scenes_.front(), values)));
+        for (auto next = put_off_.begin(); next != put_off_.end();) {
+            if (next->walk != name) {
+                ++next;
+                continue;
+            }
+            const std::function<void()> work = std::move(next->work);
+            next = put_off_.erase(next);
+            work();
+        }
     }
 
     bool only_toughness() const {
@@ -114,17 +146,26 @@ class KeptWalks::Store {
     }
 
   private:
+    struct Work {
+        std::string walk;  // of the first scene
+        std::function<void()> work;
+    };
+
+    struct Entry {
+        std::string name;
+        std::shared_ptr<KeptWalk> walk;  // null: not needed yet
+    };
+
     Record run(const Scene& base, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         SimulateOptions options;
         options.stop_requested = stop;
-        const Setting* unit = unit_of(scene);
-        if (!unit) {
-            const std::shared_ptr<KeptWalk> walk = walk_of(base);
-            return walk->reusable() ? walk->run(scene, options, rough) : simulate(scene, options);
-        }
-        const std::shared_ptr<KeptWalk> walk = walk_of(in_unit(base, *unit));
+        const std::shared_ptr<KeptWalk> walk = walk_of(of_walk(base));
         if (!walk->reusable()) {
             return simulate(scene, options);
+        }
+        const Setting* unit = unit_of(scene);
+        if (!unit) {
+            return walk->run(scene, options, rough);
         }
         Record record = walk->run(in_unit(scene, *unit), options, rough);
         record.scene_text = scene.text;
@@ -174,6 +215,20 @@ class KeptWalks::Store {
         return settings;
     }
 
+    // A scene with the values of a point, as far as they make another walk.
+    Scene at_point(Scene scene, const std::vector<double>& values) const {
+        for (const Setting& setting : settings_of_walk(scene)) {
+            set_number(scene, setting.key, setting.factor * values[setting.parameter]);
+        }
+        return scene;
+    }
+
+    // The scene whose walk serves this one.
+    Scene of_walk(const Scene& scene) const {
+        const Setting* unit = unit_of(scene);
+        return unit ? in_unit(scene, *unit) : scene;
+    }
+
     // What tells walks apart: the scene as it was read, and what the fit has changed in it.
     std::string name_of(const Scene& scene) const {
         std::string name = scene.file.string() + '\n' + scene.text;
@@ -200,27 +255,37 @@ class KeptWalks::Store {
         return std::make_shared<KeptWalk>(scene, numbers, threads_);
     }
 
+    Entry& entry_of(const std::string& name) {
+        const auto known = std::find_if(walks_.begin(), walks_.end(), [&](const Entry& entry) { return entry.name == name; });
+        if (known != walks_.end()) {
+            return *known;
+        }
+        walks_.push_back({name, nullptr});
+        if (walks_.size() > std::max(most_walks, 2 * scenes_.size())) {
+            std::erase_if(put_off_, [&](const Work& work) { return work.walk == walks_.front().name; });
+            walks_.pop_front();
+        }
+        return walks_.back();
+    }
+
     std::shared_ptr<KeptWalk> walk_of(const Scene& scene) {
         const std::string name = name_of(scene);
         const std::lock_guard lock(mutex_);
-        for (const auto& [known, walk] : walks_) {
-            if (known == name) {
-                return walk;
-            }
+        Entry& entry = entry_of(name);
+        if (!entry.walk) {
+            entry.walk = new_walk(scene);
         }
-        walks_.emplace_back(name, new_walk(scene));
-        if (walks_.size() > std::max(most_walks, 2 * scenes_.size())) {
-            walks_.pop_front();
-        }
-        return walks_.back().second;
+        return entry.walk;
     }
 
     int threads_;
     std::size_t parameters_;
     std::vector<const Scene*> scenes_;
     std::vector<Setting> toughness_, others_;
+    bool walks_tell_all_ = true;  // two points with the same walk of one scene have the same walks, and differ by toughness alone
     std::mutex mutex_;
-    std::deque<std::pair<std::string, std::shared_ptr<KeptWalk>>> walks_;
+    std::deque<Entry> walks_;
+    std::list<Work> put_off_;
 };
 
 KeptWalks::KeptWalks(const Study& study, int threads) : store_(std::make_shared<Store>(study, threads)) {}
@@ -250,6 +315,12 @@ Forward KeptWalks::near(const std::vector<double>& values) const {
 Forward KeptWalks::rough(const std::vector<double>& values) const {
     return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, true, stop); };
 }
+
+void KeptWalks::put_off(const std::vector<double>& values, std::function<void()> work) const {
+    store_->put_off(values, std::move(work));
+}
+
+void KeptWalks::catch_up(const std::vector<double>& values) const { store_->catch_up(values); }
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
 bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness(); }

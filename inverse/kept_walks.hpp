@@ -32,6 +32,13 @@ class KeptWalks {
     /// The same from the equilibria that runs have left there, roughly where these lie apart: for a search, whose end `exact` confirms.
     Forward rough(const std::vector<double>& values) const;
 
+    /// Puts off work on the walks of a point of the study until `catch_up` there: what another process has done before and need
+    /// not be done again unless something goes on from these walks.
+    void put_off(const std::vector<double>& values, std::function<void()> work) const;
+
+    /// Does what was put off on the walks of a point, in order.
+    void catch_up(const std::vector<double>& values) const;
+
     /// Whether all runs of the study are other toughnesses on walks that are kept, and cost milliseconds.
     bool only_toughness() const;
 

@@ -84,11 +84,11 @@ Solution minimize_with_nlopt(Objective& objective, const Eigen::VectorXd& start,
     const auto n = static_cast<unsigned>(objective.parameters());
     const nlopt_algorithm algorithm = algorithms().at(method.name);
     const Optimizer optimizer = make(algorithm, n, is_global(method));
-    const Optimizer local = make(NLOPT_LN_BOBYQA, n, false);
+    const Optimizer local = make(NLOPT_LN_SBPLX, n, false);  // which failed runs do not mislead
     if (algorithm == NLOPT_G_MLSL_LDS) {
         nlopt_set_local_optimizer(optimizer.get(), local.get());
     }
-    const bool builds_models = method.name == "bobyqa" || method.name == "cobyla" || method.name == "mlsl";
+    const bool builds_models = method.name == "bobyqa" || method.name == "cobyla";
     Search search{objective, optimizer.get(), builds_models, 0.0, {}};
     nlopt_set_min_objective(optimizer.get(), misfit, &search);
     // Runs are counted by the objective. Points that it already knows are free, and a method could ask for them for

@@ -115,4 +115,34 @@ std::pair<double, double> interval(const Profile& profile, double least, double 
     return ends;
 }
 
+std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
+                                  const Eigen::VectorXd& valley, double least, double rise) {
+    constexpr int most_trials = 8;
+    constexpr double farthest = 2.0;  // of the distance before
+    const double level = std::sqrt(rise);
+    double inside = 0, height_inside = 0;
+    Eigen::VectorXd away = valley;
+    for (int i = 0; i < most_trials && !objective.exhausted(); ++i) {
+        Eigen::VectorXd start = (best.x + side * distance * away).cwiseMax(0.0).cwiseMin(1.0);
+        start[j] = best.x[j] + side * distance;
+        if (start[j] < 0 || start[j] > 1) {
+            return std::nullopt;
+        }
+        const auto lowest = lowest_with(objective, start, j);
+        if (!lowest) {
+            return std::nullopt;
+        }
+        const double height = std::sqrt(std::max(0.0, lowest->evaluation->misfit - least));
+        if (height >= level) {
+            return i == 0 ? distance : std::lerp(inside, distance, (level - height_inside) / (height - height_inside));
+        }
+        inside = distance;
+        height_inside = height;
+        away = side * (lowest->x - best.x) / distance;
+        // A little beyond where the straight line comes up.
+        distance *= height > 0 ? std::min(farthest, 1.02 * level / height) : farthest;
+    }
+    return std::nullopt;
+}
+
 }  // namespace crampfit

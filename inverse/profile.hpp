@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -25,5 +26,11 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
 /// Where the profile comes up to `rise` above `least` below and above its lowest point: between two of its points as the square
 /// root of the rise goes, which is a straight line in a linear problem. A side that does not come up to it: its end's 0 or 1.
 std::pair<double, double> interval(const Profile& profile, double least, double rise);
+
+/// Where the profile of parameter j comes up to `rise` above `least` on one side of the best run, `side` -1 or 1: how far off, as
+/// a parabola has it or farther. Looked for from the parabola's end, `distance` along its `valley` [parameters], valley_j = 1, and
+/// not followed from the best run on. Absent where it does not come up within the cube, or no run was usable.
+std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
+                                  const Eigen::VectorXd& valley, double least, double rise);
 
 }  // namespace crampfit

@@ -6,10 +6,14 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
 
 namespace crampfit {
 namespace {
+
+// Of the journal's entries that hold what a search has found; parameters are its number and, by its bits, what it was asked.
+const char* const search_status = "search";
 
 template <class T> std::string_view bytes_of(const std::vector<T>& values) {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
@@ -115,33 +119,46 @@ RunStore::RunStore(const RunKeeping& keeping, const Study& study, const std::ato
     }
     journal_ = std::make_unique<RunJournal>(keeping.file, fingerprint(study), keeping.resume);
     for (const StoredRun& run : journal_->found()) {
-        known_.emplace(run.parameters, evaluation_of(run));
+        if (run.status == search_status) {
+            const auto n = static_cast<std::size_t>(run.parameters[0]);
+            searches_[n] = {std::bit_cast<std::uint64_t>(run.parameters[1]), run.results};
+        } else {
+            known_.emplace(run.parameters, evaluation_of(run));
+        }
     }
+}
+
+std::optional<Evaluation> RunStore::known(const Eigen::VectorXd& values) {
+    const std::lock_guard lock(mutex_);
+    const auto run = known_.find({values.begin(), values.end()});
+    return run == known_.end() ? std::nullopt : std::optional(run->second);
 }
 
 Evaluation RunStore::at(const Eigen::VectorXd& values, const std::function<Evaluation()>& run) {
-    const std::vector<double> key(values.begin(), values.end());
-    {
-        const std::lock_guard lock(mutex_);
-        if (const auto known = known_.find(key); known != known_.end()) {
-            return known->second;
-        }
+    if (const auto before = known(values)) {
+        return *before;
     }
-    return again(values, run);
-}
-
-Evaluation RunStore::again(const Eigen::VectorXd& values, const std::function<Evaluation()>& run) {
-    const std::vector<double> key(values.begin(), values.end());
     const Evaluation evaluation = run();
     if (!evaluation.usable() && stop_ && *stop_) {
         return evaluation;
     }
-    const std::lock_guard lock(mutex_);
-    const auto [known, is_new] = known_.emplace(key, evaluation);
-    if (journal_ && is_new) {
+    const std::vector<double> key(values.begin(), values.end());
+    if (journal_) {
         journal_->add(stored(key, evaluation));
     }
-    return known->second;
+    const std::lock_guard lock(mutex_);
+    return known_.emplace(key, evaluation).first->second;
+}
+
+std::optional<std::vector<double>> RunStore::found_by_search(std::size_t n, std::uint64_t asked) const {
+    const auto search = searches_.find(n);
+    return search == searches_.end() || search->second.first != asked ? std::nullopt : std::optional(search->second.second);
+}
+
+void RunStore::keep_search(std::size_t n, std::uint64_t asked, const std::vector<double>& found) {
+    if (journal_ && !(stop_ && *stop_)) {
+        journal_->add({{static_cast<double>(n), std::bit_cast<double>(asked)}, found, search_status, 0.0});
+    }
 }
 
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {

@@ -7,12 +7,16 @@
 #include <Eigen/Core>
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 #include <vector>
 
 namespace crampfit {
@@ -33,14 +37,19 @@ class RunStore {
     /// threads at a time. A run that the user has stopped is not kept.
     Evaluation at(const Eigen::VectorXd& values, const std::function<Evaluation()>& run);
 
-    /// What `run` gives now, kept as it would be by `at`: where what later runs give hangs on this one having been made, in this process.
-    Evaluation again(const Eigen::VectorXd& values, const std::function<Evaluation()>& run);
+    /// What is known of a run; empty where it has not been made.
+    std::optional<Evaluation> known(const Eigen::VectorXd& values);
+
+    /// What the n-th search among cheap runs has found; empty where `asked`, which tells what it was to look for, differs.
+    std::optional<std::vector<double>> found_by_search(std::size_t n, std::uint64_t asked) const;
+    void keep_search(std::size_t n, std::uint64_t asked, const std::vector<double>& found);
 
   private:
     std::unique_ptr<RunJournal> journal_;
     const std::atomic<bool>* stop_;
     std::mutex mutex_;
     std::map<std::vector<double>, Evaluation> known_;
+    std::map<std::size_t, std::pair<std::uint64_t, std::vector<double>>> searches_;  // of an earlier process
 };
 
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one

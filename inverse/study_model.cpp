@@ -62,6 +62,16 @@ void StudyModel::set_resolution(double resolution) {
     comparisons_ = comparisons_at(resolution);
 }
 
+double StudyModel::change_of_sigma(double resolution) const {
+    const std::vector<Comparison> others = comparisons_at(resolution);
+    double most = 0;
+    for (std::size_t i = 0; i < others.size(); ++i) {
+        for (std::size_t k = 0; k < others[i].stations().size(); ++k) {
+            most = std::max(most, std::abs(others[i].stations()[k].sigma / comparisons_[i].stations()[k].sigma - 1));
+        }
+    }
+    return most;
+}
 
 double StudyModel::likely_resolution(const Evaluation& evaluation, double most) const {
     constexpr double least = 1e-5;  // far below what any grid or gauge knows

@@ -38,6 +38,9 @@ class StudyModel {
     double resolution() const { return resolution_; }
     void set_resolution(double resolution);
 
+    /// The most by which another resolution would change the sigma of a measurement, as a part of it.
+    double change_of_sigma(double resolution) const;
+
     /// The resolution up to `most` that makes a usable evaluation's residuals most likely: what they have beyond the data's noise is the
     /// model's. Maximum likelihood of a component of variance, `parameters` degrees of freedom being the fit's (Harville 1977, Maximum
     /// likelihood approaches to variance component estimation, J. Am. Stat. Assoc. 72).

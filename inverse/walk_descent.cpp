@@ -2,7 +2,6 @@
 
 #include "inverse/minimize.hpp"
 #include "inverse/sobol_points.hpp"
-#include "inverse/window.hpp"
 
 #include <Eigen/Cholesky>
 
@@ -23,6 +22,7 @@ constexpr double least_radius = 1e-4;
 constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
 constexpr double least_rise = 0.05;  // of the misfit, where noise is in it: a quarter of a standard error
 constexpr double free_of_noise = 0.01;  // of the misfit for each residual: below that it is rounding of data or model
+constexpr int most_unconfirmed = 2;  // steps within the last radius whose gain no run confirms: what is left is the model's noise
 
 constexpr int points_a_parameter = 12;  // of a spread
 constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
@@ -35,6 +35,8 @@ constexpr int most_cheap_runs = 100000;
 // Where parameters turn the crack, what lies nearby tells of one way only:
 constexpr int starts_a_parameter = 6;
 constexpr int descents_of_starts = 3;
+
+constexpr int most_failed_starts = 20;
 
 // Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
 void polish(Objective& cheap, Eigen::VectorXd y) {
@@ -78,9 +80,10 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
 }
 
 // The lowest point of the model in the window.
-Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, const Objective& objective, unsigned seed) {
-    Objective cheap(centre.size(), [&](const Eigen::VectorXd& y, int threads) { return model(window.inside(y), threads); },
-                    most_cheap_runs, objective.threads(), objective.stop());
+Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, int threads,
+              const std::atomic<bool>* stop, unsigned seed) {
+    const auto in_window = [&](const Eigen::VectorXd& y, int share) { return model(window.inside(y), share); };
+    Objective cheap(centre.size(), in_window, most_cheap_runs, threads, stop);
     std::vector<Eigen::VectorXd> starts = sobol_points(model_starts * static_cast<int>(centre.size()), centre.size(), seed);
     starts.front() = window.share(centre);
     cheap.at(starts);
@@ -90,14 +93,22 @@ Run lowest(const Objective::Evaluate& model, const Window& window, const Eigen::
         polish(cheap, order[static_cast<std::size_t>(i)].x);
     }
     if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes its shape
-        Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), objective.threads());
+        Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), threads);
         minimize(branch, cheap.best()->x, {"crs2", seed});
         cheap.join(branch);
         const Eigen::VectorXd best = cheap.best()->x;
         polish(cheap, best);
     }
     const Run* best = cheap.best();
-    return best ? Run{window.inside(best->x), best->evaluation} : Run{centre, std::make_shared<Evaluation>()};
+    return best ? Lowest{window.inside(best->x), best->evaluation->misfit} : Lowest{centre, INFINITY};
+}
+
+// That of the model of the runs near a point.
+Lowest lowest_near(const Eigen::VectorXd& point, const Nearby& nearby, bool rough, const Window& window,
+                   const Objective& objective, unsigned seed) {
+    const auto search = [model = (rough ? nearby.rough : nearby.near)(point), window, point, threads = objective.threads(),
+                         stop = objective.stop(), seed] { return lowest(model, window, point, threads, stop, seed); };
+    return nearby.recall ? nearby.recall(point, window, rough, search) : search();
 }
 
 }  // namespace
@@ -113,38 +124,50 @@ void spread_about(Objective& objective, const Eigen::VectorXd& x, double step, u
 
 namespace {
 
-// One descent; whether it ended by its own criterion.
-bool descend_from(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, double enough, unsigned seed) {
+struct Descent {
+    bool converged;          // it ended by its own criterion
+    double unconfirmed = 0;  // gain of the misfit that its last steps promised and no run confirmed
+};
+
+Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, double enough, unsigned seed) {
     objective.at(start);
     Eigen::VectorXd reach(start.size());  // in radii
     for (Eigen::Index j = 0; j < reach.size(); ++j) {
         reach[j] = nearby.exact[static_cast<std::size_t>(j)] ? reach_where_exact : 1.0;
     }
-    double radius = first_radius;
-    while (objective.best() && !objective.exhausted() && radius >= least_radius) {
+    double radius = first_radius, unconfirmed = 0;
+    int in_vain = 0;
+    while (objective.best() && !objective.exhausted() && radius >= least_radius && in_vain < most_unconfirmed) {
         if (objective.best()->evaluation->misfit < enough) {
-            return true;
+            return {true};
         }
         const Run here = *objective.best();
-        const auto expected_from = [&](const Run& trial) { return here.evaluation->misfit - trial.evaluation->misfit; };
-        const auto promises = [&](const Run& trial) {
-            const bool noisy = trial.evaluation->misfit > free_of_noise * static_cast<double>(trial.evaluation->residuals.size());
-            return expected_from(trial) > std::max(least_gain * here.evaluation->misfit, noisy ? least_rise : 0.0);
+        const double misfit = here.evaluation->misfit;
+        const auto is_worth_a_run = [&](double gain) {
+            const bool noisy = misfit - gain > free_of_noise * static_cast<double>(here.evaluation->residuals.size());
+            return gain > std::max(least_gain * misfit, noisy ? least_rise : 0.0);
         };
-        Run trial = lowest(nearby.rough(here.x), Window(here.x, radius * reach), here.x, objective, seed);
-        if (!promises(trial)) {
-            trial = lowest(nearby.near(here.x), Window(here.x, last_radius), here.x, objective, seed);
+        Lowest trial = lowest_near(here.x, nearby, true, Window(here.x, radius * reach), objective, seed);
+        if (!is_worth_a_run(misfit - trial.misfit)) {
+            trial = lowest_near(here.x, nearby, false, Window(here.x, std::min(radius, last_radius)), objective, seed);
         }
-        if (!promises(trial)) {
-            return !objective.stopped();
+        const double expected = misfit - trial.misfit;
+        if (!is_worth_a_run(expected)) {
+            return {!objective.stopped(), unconfirmed};
         }
-        const double expected = expected_from(trial);
-        objective.at(trial.x);
-        const double gain = here.evaluation->misfit - objective.best()->evaluation->misfit;
-        const double step = (trial.x - here.x).cwiseAbs().cwiseQuotient(reach).maxCoeff();
+        const auto there = objective.at(trial.x);
+        const double gain = misfit - objective.best()->evaluation->misfit;
+        const Eigen::VectorXd away = (trial.x - here.x).cwiseAbs();
+        const double step = away.cwiseQuotient(reach).maxCoeff();
+        if (is_worth_a_run(gain)) {
+            in_vain = 0;
+        } else if (away.maxCoeff() <= last_radius && there && there->usable()) {
+            ++in_vain;
+            unconfirmed = expected - gain;
+        }
         radius = gain < 0.25 * expected ? 0.25 * std::min(radius, step) : std::clamp(2.0 * step, last_radius, first_radius);
     }
-    return objective.best() != nullptr && radius < least_radius;
+    return {objective.best() != nullptr && (radius < least_radius || in_vain == most_unconfirmed), unconfirmed};
 }
 
 // Whether the noise explains the misfit: residuals of two sigma at most.
@@ -154,14 +177,15 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
 }
 
 // From the initial values and Sobol points of the box one step each, along the way that the crack goes there; the lowest first.
-std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Near& near, const Eigen::VectorXd& initial, unsigned seed) {
+std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& initial,
+                                              unsigned seed) {
     std::vector<Eigen::VectorXd> starts = sobol_points(starts_a_parameter * static_cast<int>(initial.size()), initial.size(), seed);
     starts.front() = initial;
     objective.at(starts);
     std::vector<Eigen::VectorXd> steps;
     for (const Run& run : objective.runs()) {
         if (run.evaluation->usable()) {
-            steps.push_back(lowest(near(run.x), Window(run.x, 1.0), run.x, objective, seed).x);
+            steps.push_back(lowest_near(run.x, nearby, true, Window(run.x, 1.0), objective, seed).x);
         }
     }
     objective.at(steps);
@@ -180,7 +204,7 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Near& 
 
 bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed) {
     const Eigen::VectorXd start = objective.best()->x;
-    const bool converged = descend_from(objective, nearby, start, 0.0, seed);
+    const bool converged = descend_from(objective, nearby, start, 0.0, seed).converged;
     // From way to way the misfit is rough: polynomials of the runs themselves see past that.
     return nearby.ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
 }
@@ -191,7 +215,7 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
     std::vector<Eigen::VectorXd> from{initial};
     if (nearby.ways_differ) {
         stage("starts");
-        from = lowest_of_starts(objective, nearby.rough, initial, seed);
+        from = lowest_of_starts(objective, nearby, initial, seed);
     }
     for (int i = static_cast<int>(from.size()); i < starts; ++i) {
         from.push_back(sobol_point(i, p, seed));
@@ -199,17 +223,24 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
     const int least_descents = nearby.ways_differ ? descents_of_starts : 0;
     stage("descent");
     SearchResult result;
-    double least = INFINITY;  // of the descents
+    double least = INFINITY, unconfirmed = 0;  // of the descents
     int descents = 0;
-    while (descents < static_cast<int>(from.size()) && !objective.exhausted() &&
+    const auto start_is_left = [&] {
+        if (!objective.best() && descents == static_cast<int>(from.size()) && descents < starts + most_failed_starts) {
+            from.push_back(sobol_point(descents, p, seed));  // as long as all runs fail
+        }
+        return descents < static_cast<int>(from.size());
+    };
+    while (start_is_left() && !objective.exhausted() &&
            !(descents >= least_descents && objective.best() && is_explained(*objective.best()->evaluation, p))) {
         Objective branch = objective.branch(objective.budget_left(), objective.threads());
-        const bool converged = descend_from(branch, nearby, from[static_cast<std::size_t>(descents)], enough, seed);
+        const Descent descent = descend_from(branch, nearby, from[static_cast<std::size_t>(descents)], enough, seed);
         objective.join(branch);
         ++descents;
         if (branch.best() && branch.best()->evaluation->misfit < least) {
             least = branch.best()->evaluation->misfit;
-            result.converged = converged;
+            result.converged = descent.converged;
+            unconfirmed = descent.unconfirmed;
         }
     }
     result.method = fmt::format(
@@ -218,6 +249,10 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
         "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
         nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
         objective.runs().size());
+    if (unconfirmed > 0) {
+        result.method += fmt::format(" It ended where runs did not confirm what those nearby promised, {:.2g} of the misfit: so "
+                                     "well is it known.", unconfirmed);
+    }
     return result;
 }
 

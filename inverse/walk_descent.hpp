@@ -2,6 +2,7 @@
 
 #include "inverse/objective.hpp"
 #include "inverse/search.hpp"
+#include "inverse/window.hpp"
 
 #include <functional>
 #include <vector>
@@ -11,12 +12,21 @@ namespace crampfit {
 /// The study near a point [parameters], cheap: exact in some parameters, to first order in the others.
 using Near = std::function<Objective::Evaluate(const Eigen::VectorXd& point)>;
 
+/// The lowest point of a cheap model.
+struct Lowest {
+    Eigen::VectorXd x;  // [parameters]
+    double misfit;
+};
+
 /// What a run leaves behind: a cheap model of the runs nearby.
 struct Nearby {
     Near near;
     Near rough;               // the same from what is known already, at no equilibria; for a search that `near` or a run confirms
     std::vector<bool> exact;  // [parameters] in which they are; in the others to first order
     bool ways_differ;         // from point to point, which they do not see
+    /// The lowest point in a window about `point`: what the search finds, or has found before. May be empty.
+    std::function<Lowest(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search)>
+        recall = {};
 };
 
 /// Least squares where a run leaves behind a cheap model of the runs nearby: each step searches that model within a trust

@@ -80,7 +80,45 @@ TEST(UnitRotation, TurnsWithoutStress) {
     }
 }
 
-// Two wheels on the flanks of a V notch with slope 2, as in the wedge test.
+// Two wheels on the flanks of a V notch with slope 2, as in the wedge test, that go down by a part of a cell.
+Scene wheels_on_flanks(double cell) {
+    Scene scene = block({6e-3, 6e-3}, cell);
+    scene.specimen.cutouts = {Polygon{{Vec2(1.5e-3, 6e-3), Vec2(4.5e-3, 6e-3), Vec2(3e-3, 3e-3)}}};
+    scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+    for (const double side : {-1.0, 1.0}) {
+        Body wheel;
+        wheel.name = side < 0 ? "left" : "right";
+        const Vec2 on_flank(3e-3 + side * 1e-3, 5e-3), inward = Vec2(-side * 2.0, 1.0).normalized();
+        wheel.shape = Circle{on_flank + 1e-3 * inward, 1e-3};
+        wheel.velocity = {0.0, -0.2};
+        wheel.until = 1e-4;
+        scene.bodies.push_back(wheel);
+    }
+    scene.measure = {"left", "left"};
+    scene.solver.damping = 4e4;
+    scene.stop.time = 4e-4;
+    return scene;
+}
+
+// Across a wheel: 20 cells, and finer grids.
+void check_wheels_on_flanks(std::initializer_list<double> cells_across) {
+    for (const double across : cells_across) {
+        const Record record = simulate(wheels_on_flanks(2e-3 / across));
+        for (const int wheel : {1, 2}) {
+            const Vec2 force = record.reactions[wheel].force.back();
+            const double ratio = std::abs(force.x() / force.y());
+            std::printf("wheel %2.0f cells across on a flank of slope 2: force ratio %.3f\n", across, ratio);
+            EXPECT_NEAR(ratio, 2.0, 0.03 * 2.0);
+            EXPECT_LT(force.y(), 0.0);
+        }
+    }
+}
+
+TEST(VerificationWedge, WheelTwentyCellsAcross) { check_wheels_on_flanks({20.0}); }
+
+TEST(SlowVerificationWedge, WheelFortyAndSixtyCellsAcross) { check_wheels_on_flanks({40.0, 60.0}); }
+
+// The same as they go down by 0.1 mm, which turns the flanks.
 Scene wedge(double cell) {
     Scene scene = block({10e-3, 10e-3}, cell);
     scene.specimen.cutouts = {Polygon{{Vec2(3.5e-3, 10e-3), Vec2(6.5e-3, 10e-3), Vec2(5e-3, 7e-3)}}};

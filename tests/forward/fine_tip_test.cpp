@@ -81,6 +81,41 @@ TEST(UnitFineTip, NothingIsMissedInOneWood) {
     EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);                          // no sharp boundary
 }
 
+TEST(UnitFineTip, BoxesThatTakeACrackAlongAreAsMadeAnew) {
+    AtRest run(two_woods(2.025e-3, 1.8e-3, 0.1e-3));
+    std::vector<MaterialSlope> numbers;
+    numbers.emplace_back(run.scene, "materials.EW.E", run.body);
+    FineTip kept(run.scene, run.plan, run.materials, run.body, numbers);
+    const auto boxes = kept.about(run.equilibrium.cracks(), 0, {1.8e-3, 2e-3}, {2.0e-3, 2e-3});
+    ASSERT_TRUE(boxes);
+    for (const Vec2& tip : {Vec2(1.85e-3, 2e-3), Vec2(1.9e-3, 2.005e-3), Vec2(1.95e-3, 2.005e-3), Vec2(2.05e-3, 2.0e-3)}) {
+        run.equilibrium.grow(0, true, tip);
+        ASSERT_EQ(run.equilibrium.solve(1.0), Equilibrium::Outcome::solved);
+        const MissedEnergy one = kept.missed(*boxes, run.equilibrium, 0, true, true);
+        FineTip anew(run.scene, run.plan, run.materials, run.body, numbers);
+        const MissedEnergy other = anew.missed(*boxes, run.equilibrium, 0, true, true);
+        ASSERT_NE(other.energy, 0.0);
+        // Of a crack that turns, ties know where it was going when it came: made anew, where it goes.
+        EXPECT_NEAR(one.energy, other.energy, 1e-3 * std::abs(other.energy));
+        EXPECT_NEAR(one.by_number[0], other.by_number[0], 1e-3 * std::abs(other.by_number[0]));
+        // Asked for again, nothing changes.
+        EXPECT_NEAR(kept.missed(*boxes, run.equilibrium, 0, true, false).energy, one.energy, 1e-9 * std::abs(one.energy));
+    }
+}
+
+TEST(UnitCutOut, InTheGridsOwnCellsItsEquilibriumIsTheBoxs) {
+    const AtRest run(two_woods(2.025e-3, 1.93e-3, 0.1e-3));
+    const CrackFields& cracks = run.equilibrium.cracks();
+    const GridView grid{run.body, cracks, run.equilibrium.displacements(), Vec2::Zero(), 0};
+    const auto wood = std::make_shared<CutOutWood>(run.scene, run.materials, Box{Vec2(1.2e-3, 1.4e-3), Vec2(2.6e-3, 2.6e-3)}, 0.1e-3);
+    const std::vector<MaterialSlope> numbers;
+    CutOut part(run.scene, run.plan, numbers, wood);
+    ASSERT_TRUE(part.solve(cracks.lines[0], 0, true, grid, false));
+    const double solved = part.potential();
+    ASSERT_TRUE(part.solve(cracks.lines[0], 0, true, grid, true));
+    EXPECT_NEAR(part.potential(), solved, 1e-9 * solved);
+}
+
 TEST(GradientFineTip, SlopesByModuliAgainstCentralDifferences) {
     // With the specimen's own displacements going along. Steps of 1e-4 leave 1e-7.
     const std::vector<std::string> keys{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu"};

@@ -144,7 +144,7 @@ TEST(VerificationEnergy, JIsTheChangeOfEnergyInOneWood) {
     for (const bool explicitly : {false, true}) {
         const double error = against_energy(5e-3, 0.2e-3, false, explicitly);
         std::printf("J against change of energy, one wood%s: %+.2f %%\n", explicitly ? ", explicit" : "", 100 * error);
-        EXPECT_LT(std::abs(error), 0.03);
+        EXPECT_LT(std::abs(error), 0.01);
     }
 }
 
@@ -152,7 +152,7 @@ TEST(VerificationEnergy, JIsTheChangeOfEnergyAmongRings) {
     for (const double a : {2.5e-3, 3.0e-3, 7.0e-3}) {  // five cells and more from a boundary
         const double error = against_energy(a, 0.1e-3, true, false);
         std::printf("J against change of energy, rings, a = %.1f mm: %+.2f %%\n", 1e3 * a, 100 * error);
-        EXPECT_LT(std::abs(error), 0.03) << a;
+        EXPECT_LT(std::abs(error), 0.01) << a;
     }
 }
 

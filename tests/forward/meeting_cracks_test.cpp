@@ -124,6 +124,30 @@ TEST(HardMeeting, CrossesThatCutAPlateInFourCarryNothing) {
     }
 }
 
+TEST(HardMeeting, APlateCutInTwoBeforehandCarriesPressureAlone) {
+    Scene whole = square({}), cut = square({line({-1, 9.8}, {21, 9.8})});
+    hard_case("plate cut in two, drawn apart", "nothing is carried", simulate(cut).series.back().force, 1e-9);
+    for (Scene* scene : {&whole, &cut}) scene->edges[0] = moving("top", Side::top, {0.0, -mm_per_minute});
+    const Record pressed = simulate(cut);
+    EXPECT_EQ(pressed.status, RunStatus::finished) << pressed.message;
+    hard_case("plate cut in two, pressed together", "carries as a whole one",
+              stiffness_at_the_end(pressed) / stiffness_at_the_end(simulate(whole)) - 1, 1e-3);
+}
+
+TEST(HardMeeting, WhatFindsNoEquilibriumIsNotSaidToCarryNothing) {
+    // A wheel that stands a millimetre deep in the wood from the start.
+    Scene scene = square({line({-1, 9.8}, {10, 9.8})});
+    scene.edges[0].range = {{0.0, 4e-3}};
+    scene.edges[0].velocity[1] = 0.0;
+    Body wheel;
+    wheel.name = "wheel";
+    wheel.shape = Circle{{10e-3, 20e-3}, 1e-3};
+    wheel.velocity = {0.0, -mm_per_minute};
+    scene.bodies = {wheel};
+    scene.measure = {"wheel", "wheel"};
+    EXPECT_EQ(simulate(scene).status, RunStatus::unstable);
+}
+
 TEST(HardMeeting, AClosedCrackAcrossAnotherChangesNothing) {
     // Pressed together along its own line of symmetry it carries all that the wood carried.
     for (const double offset : {0.0, 0.5}) {

@@ -98,6 +98,26 @@ TEST(VerificationProfile, IntervalsOfALinearProblemAreExact) {
     std::printf("profile: %zu runs for both\n", objective.runs().size());
 }
 
+// From the parabola's end, and from one that is too near, the same end; the cube has none beyond it.
+TEST(VerificationProfile, EndsOfALinearProblemAreFoundFromAGuess) {
+    const Normal normal;
+    Objective objective = normal.objective(10000);
+    const crampfit::Run best{normal.mean, objective.at(normal.mean)};
+    for (Eigen::Index j = 0; j < 2; ++j) {
+        const double sd = std::sqrt(normal.covariance(j, j));
+        const Eigen::VectorXd valley = normal.covariance.col(j) / normal.covariance(j, j);
+        const Eigen::VectorXd other = Eigen::Vector2d::Unit(j);
+        for (const int side : {-1, 1}) {
+            const auto from_end = profile_end(objective, best, j, side, 1.96 * sd, valley, 0, 1.96 * 1.96);
+            const auto from_nearer = profile_end(objective, best, j, side, 0.5 * sd, other, 0, 1.96 * 1.96);
+            ASSERT_TRUE(from_end && from_nearer);
+            EXPECT_NEAR(*from_end, 1.96 * sd, 1e-4 * sd);
+            EXPECT_NEAR(*from_nearer, 1.96 * sd, 1e-4 * sd);
+            EXPECT_FALSE(profile_end(objective, best, j, side, 1.96 * sd, valley, 0, std::pow(1.1 / sd, 2)));
+        }
+    }
+}
+
 FitOptions cheap(const FakeWedge& wedge, int threads) {
     FitOptions options = with(wedge, threads);
     options.cheap_runs = true;

@@ -106,6 +106,35 @@ TEST(UnitKeptWalks, AnotherUnitOfStressIsOnTheSameWalk) {
     EXPECT_NEAR(second.driving[1].toughness, 1.7 * first.driving[1].toughness, 1e-9);
 }
 
+// What was put off is done, in its order, where something goes on from the same walks, and not where these were given up since.
+TEST(UnitKeptWalks, WorkPutOffIsDoneWhereItsWalksGoOn) {
+    Study study = toughness_study(across_inclined_rings(GrowthDirection::normal_to_opening));
+    Parameter modulus;
+    modulus.keys = {"materials.LW.E"};
+    modulus.initial = 4000e6;
+    study.parameters.push_back(modulus);
+    const KeptWalks walks(study);
+    std::string done;
+    const auto put_off = [&](double toughness, double stiffness, char letter) {
+        walks.put_off({toughness, 100, stiffness}, [&done, letter] { done += letter; });
+    };
+    put_off(100, 3e9, 'a');
+    put_off(100, 4e9, 'b');
+    put_off(200, 3e9, 'c');
+    EXPECT_EQ(done, "");
+    walks.catch_up({300, 100, 3e9});
+    EXPECT_EQ(done, "ac");
+    walks.catch_up({300, 100, 3e9});
+    EXPECT_EQ(done, "ac");
+    for (int i = 0; i < 6; ++i) {  // as many walks as are kept
+        put_off(100, 5e9 + 1e9 * i, 'd');
+    }
+    walks.catch_up({100, 100, 4e9});
+    EXPECT_EQ(done, "ac");
+    walks.catch_up({100, 100, 10e9});
+    EXPECT_EQ(done, "acd");
+}
+
 // What is loaded by forces, or flows at some stress, has another unit of stress.
 TEST(UnitStressUnit, IsRefusedWhereOtherStressHasASay) {
     const Scene free = across_inclined_rings(GrowthDirection::straight);

@@ -1,5 +1,7 @@
 #include "inverse/run_store.hpp"
 #include "datasets/error.hpp"
+#include "datasets/io.hpp"
+#include "forward/simulate.hpp"
 #include "inverse/fit.hpp"
 #include "inverse/sensitivity.hpp"
 #include "tests/inverse/fake_wedge.hpp"
@@ -106,7 +108,7 @@ TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
             fit_study(study, options);
             ::_exit(0);
         }
-        std::this_thread::sleep_for(std::chrono::microseconds(5000 + generator() % 15000));
+        std::this_thread::sleep_for(std::chrono::microseconds(5000 + generator() % 15000) * (1 + rounds / 20));
         ::kill(child, SIGKILL);
         int status = 0;
         ::waitpid(child, &status, 0);
@@ -130,6 +132,56 @@ TEST(SystemResume, AFitKilledAtRandomEndsAtTheSameBitsAndRepeatsNoRun) {
 
     options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::logic_error("run again"); };
     expect_same_bits(fit_study(study, options), whole);
+}
+
+// Wheels drive a notch apart: each equilibrium is found from those before it. Wherever the journal ends, as after a kill, the
+// same runs and searches come after it, with the same bits.
+TEST(SlowResume, AFitWithWheelsGoesOnFromAnywhereWithTheSameBits) {
+    const TemporaryFolder folder;
+    Study study;
+    Experiment& experiment = study.experiments.emplace_back();
+    experiment.name = "wedge";
+    experiment.scene = read_scene(std::filesystem::path(SAMPLES) / "wedge.toml");
+    experiment.scene.model.cell = 0.4e-3;
+    experiment.scene.specimen.picture.reset();
+    experiment.scene.specimen.rings = Rings{Vec2(5e-3, 30e-3), 2.2e-3, 0.25, 0.3e-3};
+    experiment.scene.cracks[0].advance = 0.8e-3;
+    experiment.scene.stop.crack_length = 2.7e-3;
+    experiment.scene.output.frames = 0;
+    experiment.noise.force = 0.5;
+    experiment.noise.crack_length = 1e-4;
+    Record record = simulate(experiment.scene);
+    std::vector<Instant> rows;
+    for (std::size_t i = 0; i < record.series.size(); i += 4) {
+        rows.push_back(record.series[i]);
+    }
+    record.series = rows;
+    experiment.data = measure(record, *experiment.noise.force, *experiment.noise.crack_length, 3);
+    study.parameters = {toughness_parameter("EW", 40)};
+    for (const auto& [wood, initial] : {std::pair("EW", 15e6), std::pair("LW", 3000e6)}) {
+        Parameter modulus = toughness_parameter(wood, initial);
+        modulus.name = std::string(wood) + " modulus";
+        modulus.keys = {std::string("materials.") + wood + ".E"};
+        modulus.lower = 0.2 * initial;
+        modulus.upper = 5 * initial;
+        study.parameters.push_back(modulus);
+    }
+    study.optimizer.max_runs = 12;
+    FitOptions options;
+    options.threads = 1;
+    options.keeping = {folder / "fit.runs", false};
+    const Fit whole = fit_study(study, options);
+    const std::string bytes = folder.read("fit.runs");
+    ASSERT_GT(whole.runs.size(), 3u);
+    options.keeping.resume = true;
+    std::mt19937 generator(7);
+    for (int i = 0; i < 5; ++i) {
+        const std::size_t left = i == 0 ? bytes.size() : generator() % bytes.size();
+        folder.write("fit.runs", bytes.substr(0, left));
+        std::printf("resumed after %zu of %zu bytes\n", left, bytes.size());
+        expect_same_bits(fit_study(study, options), whole);
+        EXPECT_EQ(folder.read("fit.runs").size(), bytes.size());
+    }
 }
 
 TEST(SystemResume, ATornLastEntryCostsOneRun) {
