@@ -20,12 +20,9 @@ void correlate(benchmark::State& state, int order) {
     options.step = 5;
     options.order = order;
     const Correlator correlator(fine(camera.photograph(0)), {}, options, "reference");
-    const auto stretch = [](const Vec2& place) {
-        return Vec2(0.01 * (place.x() - 256), 0.3 - 0.004 * (place.y() - 256));
-    };
+    const auto stretch = [](const Vec2& place) { return Vec2(0.01 * (place.x() - 256), 0.3 - 0.004 * (place.y() - 256)); };
     const FinePicture image = fine(camera.photograph(stretch, 1));
-    for (auto _ : state)
-        benchmark::DoNotOptimize(correlator.field(image));
+    for (auto _ : state) benchmark::DoNotOptimize(correlator.field(image));
     state.SetItemsProcessed(state.iterations() * correlator.lattice().count());
 }
 

@@ -106,15 +106,26 @@ void crack_across_wood(benchmark::State& state) {
     }
 }
 
-BENCHMARK(crack_across_wood)->Args({92, 1, 0})->Args({92, 1, 4})->Args({368, 2, 0})->Iterations(1)->Unit(benchmark::kSecond)
+BENCHMARK(crack_across_wood)
+    ->Args({92, 1, 0})
+    ->Args({92, 1, 4})
+    ->Args({368, 2, 0})
+    ->Iterations(1)
+    ->Unit(benchmark::kSecond)
     ->MeasureProcessCPUTime();
-BENCHMARK_CAPTURE(elastic_block, gimp, ShapeFunction::gimp, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
-BENCHMARK_CAPTURE(elastic_block, splines, ShapeFunction::bspline2, VelocityUpdate::automatic)->Args({500, 1})->Args({500, 2})->UseRealTime();
+BENCHMARK_CAPTURE(elastic_block, gimp, ShapeFunction::gimp, VelocityUpdate::automatic)
+    ->Args({500, 1})
+    ->Args({500, 2})
+    ->UseRealTime();
+BENCHMARK_CAPTURE(elastic_block, splines, ShapeFunction::bspline2, VelocityUpdate::automatic)
+    ->Args({500, 1})
+    ->Args({500, 2})
+    ->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, flip, ShapeFunction::gimp, VelocityUpdate::flip)->Args({500, 1})->UseRealTime();
 BENCHMARK_CAPTURE(elastic_block, xpic2, ShapeFunction::gimp, VelocityUpdate::xpic)->Args({500, 1})->UseRealTime();
 BENCHMARK(wood_without_crack)->Arg(46)->Arg(92)->Arg(184);
 BENCHMARK(wood_with_crack_and_J)->Arg(46)->Arg(92)->Arg(184);
 
-} // namespace
+}  // namespace
 
 BENCHMARK_MAIN();

@@ -6,8 +6,8 @@ namespace crampfit::reference {
 
 namespace {
 
-constexpr double stress = 1e5;             // remote [Pa]
-constexpr double wave_speed = 365.0;       // of a bar of earlywood [m/s]
+constexpr double stress = 1e5;        // remote [Pa]
+constexpr double wave_speed = 365.0;  // of a bar of earlywood [m/s]
 
 Scene with_points(Scene scene, int points_per_cell) {
     scene.model.points_per_cell = points_per_cell;
@@ -19,9 +19,16 @@ double slowest_of_block(double size) { return std::numbers::pi * wave_speed / (2
 
 // ---- an infinite plate with a crack (Griffith 1921; Westergaard 1939): a square cut out of it
 
-Problem griffith(const std::string& name, double slant, const std::string& quantity, std::function<double(const Instant&)> ratio) {
+Problem griffith(const std::string& name, double slant, const std::string& quantity,
+                 std::function<double(const Instant&)> ratio) {
     const SlantedCrack plate;
-    return {name, quantity, "Westergaard 1939", 0.0, "half crack", {5, 10, 20, 40}, 0.5 * slowest_of_block(6.0 * plate.half_length),
+    return {name,
+            quantity,
+            "Westergaard 1939",
+            0.0,
+            "half crack",
+            {5, 10, 20, 40},
+            0.5 * slowest_of_block(6.0 * plate.half_length),
             [slant](double cells, int points_per_cell) {
                 SlantedCrack crack;
                 crack.cells = cells;
@@ -65,7 +72,7 @@ Scene growing_strip(double cells, int points_per_cell) {
     return scene;
 }
 
-} // namespace
+}  // namespace
 
 Scene edge_crack(double cells, double share, int points_per_cell) {
     const double a = 10e-3, h = a / cells, W = a / share, H = 3 * W;
@@ -83,8 +90,8 @@ Scene edge_crack(double cells, double share, int points_per_cell) {
 
 double edge_crack_K(double share) {
     const double angle = 0.5 * std::numbers::pi * share;
-    const double F = std::sqrt(std::tan(angle) / angle) / std::cos(angle) *
-                     (0.752 + 2.02 * share + 0.37 * std::pow(1 - std::sin(angle), 3));
+    const double F =
+        std::sqrt(std::tan(angle) / angle) / std::cos(angle) * (0.752 + 2.02 * share + 0.37 * std::pow(1 - std::sin(angle), 3));
     return stress * std::sqrt(std::numbers::pi * 10e-3) * F;
 }
 
@@ -110,18 +117,48 @@ double double_cantilever_G() {
 std::vector<Problem> problems() {
     const double arm_speed = std::sqrt(1e5 / 300.0) * 12e-3 / std::sqrt(12.0);  // of bending, (E I / rho A)^1/2 [m^2/s]
     return {
-        griffith("centre crack", 0.0, "G", [](const Instant& end) { return end.G * plane_modulus() / (griffith_K() * griffith_K()); }),
+        griffith("centre crack", 0.0, "G",
+                 [](const Instant& end) { return end.G * plane_modulus() / (griffith_K() * griffith_K()); }),
         griffith("slanted crack at 30 deg", 30 * degree, "K_II",
                  [](const Instant& end) { return end.K_II / (griffith_K() * std::sin(30 * degree) * std::cos(30 * degree)); }),
-        {"edge crack", "K_I", "Tada, Paris and Irwin 2000", 0.005, "crack", {5, 10, 20, 40}, 0.2 * slowest_of_block(60e-3),
+        {"edge crack",
+         "K_I",
+         "Tada, Paris and Irwin 2000",
+         0.005,
+         "crack",
+         {5, 10, 20, 40},
+         0.2 * slowest_of_block(60e-3),
          [](double cells, int points) { return edge_crack(cells, 0.5, points); },
          [](const Record& record) { return record.series.back().K_I / edge_crack_K(0.5); }},
-        {"double cantilever beam", "G", "Kanninen 1973", 0.01, "arm height", {6, 12, 24}, 3.52 * arm_speed / (48.5e-3 * 48.5e-3), double_cantilever,
+        {"double cantilever beam",
+         "G",
+         "Kanninen 1973",
+         0.01,
+         "arm height",
+         {6, 12, 24},
+         3.52 * arm_speed / (48.5e-3 * 48.5e-3),
+         double_cantilever,
          [](const Record& record) { return record.series.back().G / double_cantilever_G(); }},
-        {"strip", "G", "Rice 1968", 0.0, "half height", {5, 10, 20}, slowest_of_block(60e-3), strip,
+        {"strip",
+         "G",
+         "Rice 1968",
+         0.0,
+         "half height",
+         {5, 10, 20},
+         slowest_of_block(60e-3),
+         strip,
          [](const Record& record) { return record.series.back().G / strip_G(); }},
-        {"strip", "displacement at growth", "Rice 1968", 0.0, "half height", {5, 10, 20}, 0.0, growing_strip,
-         [](const Record& record) { return record.driving.empty() ? std::nan("") : record.driving.front().displacement / (0.5 * strip_pull); }},
+        {"strip",
+         "displacement at growth",
+         "Rice 1968",
+         0.0,
+         "half height",
+         {5, 10, 20},
+         0.0,
+         growing_strip,
+         [](const Record& record) {
+             return record.driving.empty() ? std::nan("") : record.driving.front().displacement / (0.5 * strip_pull);
+         }},
     };
 }
 
@@ -139,4 +176,4 @@ Scene in_damped_motion(Scene scene, double slowest) {
     return scene;
 }
 
-} // namespace crampfit::reference
+}  // namespace crampfit::reference

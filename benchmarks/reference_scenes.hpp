@@ -82,8 +82,8 @@ inline Mat2 griffith_stress(const Mat2& remote, double a, const Vec2& x) {
     return stress;
 }
 
-/// Puts on all four sides of a square what the stress of a solution says, facet by facet, and holds the square so that what holds it
-/// feels nothing: the load is in balance.
+/// Puts on all four sides of a square what the stress of a solution says, facet by facet, and holds the square so that what holds
+/// it feels nothing: the load is in balance.
 template <class Stress>
 void load_sides(Scene& scene, Stress stress) {
     const double width = scene.specimen.size.x(), h = scene.model.cell;
@@ -107,17 +107,17 @@ void load_sides(Scene& scene, Stress stress) {
 }
 
 struct SlantedCrack {
-    double cells = 10.0;             // per half crack
-    double angle = 0.0;              // of the crack against the grid [rad]
-    Mat2 remote = Mat2::Zero();      // stress far away [Pa]
-    Vec2 offset = Vec2::Zero();      // of the crack's centre from a node, in cells
-    double half_length = 10e-3;      // a [m]
+    double cells = 10.0;         // per half crack
+    double angle = 0.0;          // of the crack against the grid [rad]
+    Mat2 remote = Mat2::Zero();  // stress far away [Pa]
+    Vec2 offset = Vec2::Zero();  // of the crack's centre from a node, in cells
+    double half_length = 10e-3;  // a [m]
     int points_per_cell = 4;
 };
 
-/// A square of half width 3 a cut out of the infinite plate with a centre crack: its sides carry the exact stress there, so that K
-/// is exactly that of the infinite plate.
-/// `exact` is that of the wood, by default isotropic: remote stress, half length, place, all in the crack's axes.
+/// A square of half width 3 a cut out of the infinite plate with a centre crack: its sides carry the exact stress there, so that
+/// K is exactly that of the infinite plate. `exact` is that of the wood, by default isotropic: remote stress, half length, place,
+/// all in the crack's axes.
 template <class Exact = decltype(griffith_stress)>
 Scene slanted_crack(const SlantedCrack& c, const Exact& exact = griffith_stress) {
     const double a = c.half_length;
@@ -139,4 +139,4 @@ Scene slanted_crack(const SlantedCrack& c, const Exact& exact = griffith_stress)
     return scene;
 }
 
-} // namespace crampfit::reference
+}  // namespace crampfit::reference

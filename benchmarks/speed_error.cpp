@@ -21,7 +21,7 @@ Scene with_splines(Scene scene) {
     return scene;
 }
 
-} // namespace
+}  // namespace
 
 std::vector<BenchRun> bench_runs() {
     std::vector<BenchRun> runs;
@@ -32,13 +32,15 @@ std::vector<BenchRun> bench_runs() {
                 scene.output.samples = 2;
                 const std::string options = fmt::format("{} points a cell", points);
                 // A second grid betters energies and so when a crack grows, not G and K at a tip that stands.
-                if (scene.cracks[0].grows != Growth::none) runs.push_back({problem, "equilibrium", options + " and two grids", cells, scene});
+                if (scene.cracks[0].grows != Growth::none)
+                    runs.push_back({problem, "equilibrium", options + " and two grids", cells, scene});
                 scene.solver.extrapolate = false;
                 runs.push_back({problem, "equilibrium", options, cells, scene});
                 if (problem.slowest == 0.0 || points != 4 || cells > most_explicit_cells) continue;
                 const Scene moving = in_damped_motion(scene, problem.slowest);
                 runs.push_back({problem, "explicit", options, cells, moving});
-                if (cells <= most_spline_cells) runs.push_back({problem, "explicit", options + ", B-splines", cells, with_splines(moving)});
+                if (cells <= most_spline_cells)
+                    runs.push_back({problem, "explicit", options + ", B-splines", cells, with_splines(moving)});
             }
         }
     }
@@ -47,16 +49,18 @@ std::vector<BenchRun> bench_runs() {
 
 SpeedError measure(const BenchRun& run) {
     const Record record = simulate(run.scene);
-    return {run.problem.name, run.problem.quantity, run.solver, run.options, run.problem.counted, run.cells, run.scene.model.cell,
-            record.points, record.seconds, run.problem.ratio(record) - 1.0, run.problem.known_to};
+    return {run.problem.name,    run.problem.quantity, run.solver,    run.options,    run.problem.counted,
+            run.cells,           run.scene.model.cell, record.points, record.seconds, run.problem.ratio(record) - 1.0,
+            run.problem.known_to};
 }
 
 std::string csv(const std::vector<SpeedError>& rows) {
-    std::string text = "problem,quantity,solver,options,cells_per,cells,cell_m,points,seconds_s,error_relative,known_to_relative\n";
+    std::string text =
+        "problem,quantity,solver,options,cells_per,cells,cell_m,points,seconds_s,error_relative,known_to_relative\n";
     for (const SpeedError& row : rows)
-        text += fmt::format("{},{},{},{},{},{:g},{:.6g},{},{:.4g},{:.6g},{:g}\n", row.problem, row.quantity, row.solver, row.options,
-                            row.counted, row.cells, row.cell, row.points, row.seconds, row.error, row.known_to);
+        text += fmt::format("{},{},{},{},{},{:g},{:.6g},{},{:.4g},{:.6g},{:g}\n", row.problem, row.quantity, row.solver,
+                            row.options, row.counted, row.cells, row.cell, row.points, row.seconds, row.error, row.known_to);
     return text;
 }
 
-} // namespace crampfit::reference
+}  // namespace crampfit::reference

@@ -15,7 +15,8 @@ namespace {
 
 ExitStatus bench(const std::filesystem::path& output, const CommonOptions& common) {
     if (!common.settings.empty())
-        throw InputError("command line", "--set", common.settings.front(), "the problems are built in; there is nothing to override");
+        throw InputError("command line", "--set", common.settings.front(),
+                         "the problems are built in; there is nothing to override");
     require_writable(output);
     stop_on_signals();
     const std::vector<reference::BenchRun> runs = reference::bench_runs();
@@ -23,8 +24,7 @@ ExitStatus bench(const std::filesystem::path& output, const CommonOptions& commo
     {
         ProgressLine line(common, "runs");
         for (const reference::BenchRun& run : runs) {
-            if (stop_requested())
-                break;
+            if (stop_requested()) break;
             line.show(static_cast<double>(rows.size()) / static_cast<double>(runs.size()), static_cast<long>(rows.size()),
                       fmt::format("{}, {}, {:g} cells", run.problem.name, run.solver, run.cells));
             rows.push_back(reference::measure(run));

@@ -37,8 +37,7 @@ constexpr double wood_blur = 0.7;  // [px]
 
 double length_of(const std::string& text, const NumberRule& rule, const char* option) {
     const double value = parse_quantity(text, rule.dimension, {"command line", option});
-    if (!rule.allows(value))
-        throw InputError("command line", option, text, rule.rule);
+    if (!rule.allows(value)) throw InputError("command line", option, text, rule.rule);
     return value;
 }
 
@@ -47,34 +46,31 @@ Placement placement_of_wood(const Arguments& arguments, const Record& record) {
     const Document scene(record.scene_text, arguments.record, {});
     const Entry specimen = scene.root().at("specimen");
     Placement placement;
-    if (!arguments.wood_pixel.empty())
-        placement.pixel = length_of(arguments.wood_pixel, limits::pixel, "--wood-pixel");
-    else if (const auto pixel = specimen.find("pixel"))
-        placement.pixel = pixel->number(limits::pixel);
+    if (!arguments.wood_pixel.empty()) placement.pixel = length_of(arguments.wood_pixel, limits::pixel, "--wood-pixel");
+    else if (const auto pixel = specimen.find("pixel")) placement.pixel = pixel->number(limits::pixel);
     else
-        throw InputError("command line", "--wood-pixel", "absent", "must be given: the record's scene does not say how large a pixel of the picture is");
-    if (const auto offset = specimen.find("offset"))
-        placement.offset = offset->point();
-    if (const auto rotation = specimen.find("rotation"))
-        placement.rotation = rotation->number(limits::rotation);
+        throw InputError("command line", "--wood-pixel", "absent",
+                         "must be given: the record's scene does not say how large a pixel of the picture is");
+    if (const auto offset = specimen.find("offset")) placement.offset = offset->point();
+    if (const auto rotation = specimen.find("rotation")) placement.rotation = rotation->number(limits::rotation);
     return placement;
 }
 
 /// The gray of the wood that the scene's specimen was made from.
 std::function<double(const Vec2&)> wood_of(const Arguments& arguments, const Record& record, double pixel) {
-    if (arguments.wood.empty())
-        return {};
+    if (arguments.wood.empty()) return {};
     Placement placement = placement_of_wood(arguments, record);
     const FinePicture picture = read_fine_gray(arguments.wood, {"command line", "--wood"});
     placement.rows = picture.rows;
     Vec2 size = Vec2::Zero();
-    for (const Vec2& place : record.point_position)
-        size = size.cwiseMax(place);
+    for (const Vec2& place : record.point_position) size = size.cwiseMax(place);
     if (!covers(picture, placement, size))
         throw InputError("command line", "--wood", arguments.wood.string(),
-                         fmt::format("must show the whole specimen, {:.3g} x {:.3g} mm; it is {:.3g} x {:.3g} mm, its lower left corner at {:.3g}, {:.3g} mm",
-                                     1e3 * size.x(), 1e3 * size.y(), 1e3 * placement.pixel * picture.columns, 1e3 * placement.pixel * picture.rows,
-                                     1e3 * placement.offset.x(), 1e3 * placement.offset.y()));
+                         fmt::format("must show the whole specimen, {:.3g} x {:.3g} mm; it is {:.3g} x {:.3g} mm, its lower left "
+                                     "corner at {:.3g}, {:.3g} mm",
+                                     1e3 * size.x(), 1e3 * size.y(), 1e3 * placement.pixel * picture.columns,
+                                     1e3 * placement.pixel * picture.rows, 1e3 * placement.offset.x(),
+                                     1e3 * placement.offset.y()));
     return wood_surface(picture, placement, pixel);
 }
 
@@ -128,8 +124,7 @@ ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
     const std::filesystem::path folder = make_folder(arguments.folder);
     write_gray(camera.reference(), folder / "reference.png");
     write_curves(load_of(record), folder / "load.csv");
-    if (record.series.front().crack_length > 0)
-        write_whole_file(folder / "truth.csv", truth_of(record, camera.view()));
+    if (record.series.front().crack_length > 0) write_whole_file(folder / "truth.csv", truth_of(record, camera.view()));
 
     stop_on_signals();
     ProgressLine line(common, "pictures");
@@ -137,15 +132,16 @@ ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
     const int count = static_cast<int>(record.frames.size());
     std::atomic<int> done = 0;
     parallel_for(count, common.threads, [&](int frame) {
-        if (stop_requested())
-            return;
+        if (stop_requested()) return;
         write_gray(camera.photograph(frame), folder / fmt::format("image_{:04}.png", frame));
         const std::lock_guard lock(mutex);
         ++done;
         line.show(static_cast<double>(done) / count, done, "");
     });
-    report(common, fmt::format("{} pictures beside reference.png in {}; the lower left corner lies at [\"{:g} mm\", \"{:g} mm\"] of the specimen",
-                               done.load(), folder.string(), 1e3 * camera.view().corner.x(), 1e3 * camera.view().corner.y()));
+    report(common,
+           fmt::format(
+               "{} pictures beside reference.png in {}; the lower left corner lies at [\"{:g} mm\", \"{:g} mm\"] of the specimen",
+               done.load(), folder.string(), 1e3 * camera.view().corner.x(), 1e3 * camera.view().corner.y()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 
@@ -159,17 +155,29 @@ Verb camera_verb(CLI::App& command, const CommonOptions& common) {
     verb->add_option("-o,--output", arguments->folder, "Folder for reference.png, image_0000.png ..., load.csv and truth.csv")
         ->type_name("FOLDER")
         ->required();
-    verb->add_option("--pixel", arguments->pixel, "Edge of a pixel on the specimen, as in \"20 um\"")->type_name("LENGTH")->required();
-    verb->add_option("--margin", arguments->margin, "Of background around the specimen")->type_name("LENGTH")->capture_default_str();
-    CLI::Option* wood = verb->add_option("--wood", arguments->wood, "A picture of the specimen, which is then seen as it is, without a speckle pattern on it")
-                            ->type_name("PICTURE");
-    verb->add_option("--wood-pixel", arguments->wood_pixel, "Edge of that picture's pixel on the specimen; else as the scene has it")
+    verb->add_option("--pixel", arguments->pixel, "Edge of a pixel on the specimen, as in \"20 um\"")
+        ->type_name("LENGTH")
+        ->required();
+    verb->add_option("--margin", arguments->margin, "Of background around the specimen")
+        ->type_name("LENGTH")
+        ->capture_default_str();
+    CLI::Option* wood =
+        verb->add_option("--wood", arguments->wood,
+                         "A picture of the specimen, which is then seen as it is, without a speckle pattern on it")
+            ->type_name("PICTURE");
+    verb->add_option("--wood-pixel", arguments->wood_pixel,
+                     "Edge of that picture's pixel on the specimen; else as the scene has it")
         ->type_name("LENGTH")
         ->needs(wood);
-    verb->add_option("--blur", arguments->blur, "Of the lens, one standard deviation in pixels; 0.7 with --wood, else in --spot")->type_name("PIXELS");
+    verb->add_option("--blur", arguments->blur, "Of the lens, one standard deviation in pixels; 0.7 with --wood, else in --spot")
+        ->type_name("PIXELS");
     verb->add_option("--noise", options.noise, "Standard deviation of each pixel's gray, of 255")->capture_default_str();
-    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")->capture_default_str()->excludes(wood);
-    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")->capture_default_str()->excludes(wood);
+    verb->add_option("--spot", options.spot_radius, "Radius of the pattern's spots in pixels, one standard deviation")
+        ->capture_default_str()
+        ->excludes(wood);
+    verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")
+        ->capture_default_str()
+        ->excludes(wood);
     verb->add_option("--seed", options.seed, "Of the pattern and the noise")->capture_default_str();
     return {verb, [arguments, &common] { return photograph(*arguments, common); }};
 }

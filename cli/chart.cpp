@@ -35,8 +35,7 @@ struct Axis {
     }
     /// Room at both ends, and a range where all values are the same, or so nearly that ticks could not tell them apart.
     void widen() {
-        if (!(low <= high))
-            low = high = log ? 1 : 0;
+        if (!(low <= high)) low = high = log ? 1 : 0;
         if (log) {
             const double factor = std::max(1.2, std::pow(high / low, 0.04));
             low /= factor;
@@ -56,11 +55,9 @@ std::vector<double> linear_ticks(const Axis& axis, int count) {
     const double power = std::pow(10, std::floor(std::log10(rough)));
     double step = 10 * power;
     for (const double factor : {5.0, 2.0, 1.0})
-        if (factor * power >= rough)
-            step = factor * power;
+        if (factor * power >= rough) step = factor * power;
     std::vector<double> ticks;
-    for (double i = std::ceil(axis.low / step); i * step <= axis.high && ticks.size() < 50; ++i)
-        ticks.push_back(i * step);
+    for (double i = std::ceil(axis.low / step); i * step <= axis.high && ticks.size() < 50; ++i) ticks.push_back(i * step);
     return ticks;
 }
 
@@ -80,8 +77,7 @@ std::vector<double> log_ticks(const Axis& axis) {
 std::string number_text(double value, double step) {
     const double clean = std::abs(value) < 1e-9 * step ? 0 : value;
     std::string text = fmt::format("{:.6g}", clean);
-    if (text.front() == '-')
-        text.replace(0, 1, "−");
+    if (text.front() == '-') text.replace(0, 1, "−");
     return text;
 }
 
@@ -89,16 +85,12 @@ class Drawing {
   public:
     explicit Drawing(const Chart& chart) : chart_(chart) {
         y_.log = chart.log_y;
-        for (const ChartSeries& series : chart.series)
-            include(series);
+        for (const ChartSeries& series : chart.series) include(series);
         for (const ChartPicture& picture : chart.pictures) {
-            for (const double x : {picture.left, picture.right})
-                x_.include(x);
-            for (const double y : {picture.bottom, picture.top})
-                y_.include(y);
+            for (const double x : {picture.left, picture.right}) x_.include(x);
+            for (const double y : {picture.bottom, picture.top}) y_.include(y);
         }
-        for (const double level : chart.y_levels)
-            y_.include(level);
+        for (const double level : chart.y_levels) y_.include(level);
         empty_ = !(x_.low <= x_.high && y_.low <= y_.high);
         x_.widen();
         y_.widen();
@@ -106,12 +98,10 @@ class Drawing {
     }
 
     std::string figure() {
-        if (empty_)
-            return {};
+        if (empty_) return {};
         draw_pictures();
         draw_axes();
-        for (const ChartSeries& series : chart_.series)
-            draw_series(series);
+        for (const ChartSeries& series : chart_.series) draw_series(series);
         const std::string caption =
             chart_.caption.empty() ? "" : fmt::format("<figcaption>{}</figcaption>\n", escaped(chart_.caption));
         return fmt::format(
@@ -123,16 +113,14 @@ class Drawing {
   private:
     void include(const ChartSeries& series) {
         for (std::size_t i = 0; i < series.x.size(); ++i) {
-            if (!x_.takes(series.x[i]) || !y_.takes(series.y[i]))
-                continue;
+            if (!x_.takes(series.x[i]) || !y_.takes(series.y[i])) continue;
             const double dx = series.x_error.empty() ? 0 : series.x_error[i];
             const double dy = series.y_error.empty() ? 0 : series.y_error[i];
             for (const double sign : {-1.0, 1.0}) {
                 x_.include(series.x[i] + sign * dx);
                 y_.include(series.y[i] + sign * dy);
             }
-            if (series.kind == ChartSeries::Kind::bars)
-                y_.include(0);
+            if (series.kind == ChartSeries::Kind::bars) y_.include(0);
         }
     }
 
@@ -147,8 +135,7 @@ class Drawing {
         double line = 0;
         int lines = 0;
         for (const ChartSeries& series : chart_.series) {
-            if (series.label.empty())
-                continue;
+            if (series.label.empty()) continue;
             const double needed = 30 + character_width * static_cast<double>(series.label.size());
             if (lines == 0 || line + needed > plot_width) {
                 ++lines;
@@ -187,8 +174,7 @@ class Drawing {
 
     /// Wraps what belongs to a frame.
     std::string framed(int frame, const std::string& markup) const {
-        if (frame == always)
-            return markup;
+        if (frame == always) return markup;
         return fmt::format("<g data-frame=\"{}\"{}>{}</g>\n", frame, frame == chart_.last_frame ? " class=\"shown last\"" : "",
                            markup);
     }
@@ -208,15 +194,13 @@ class Drawing {
         const std::vector<double> y_ticks = y_.log ? log_ticks(y_) : linear_ticks(y_, 5);
         const bool grid = chart_.pictures.empty();
         for (const double tick : x_ticks) {
-            if (grid)
-                line(x_.at(tick), y_.from, x_.at(tick), y_.to, "#ececec");
+            if (grid) line(x_.at(tick), y_.from, x_.at(tick), y_.to, "#ececec");
             line(x_.at(tick), y_.from, x_.at(tick), y_.from + 4, "#555");
             svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", x_.at(tick), y_.from + 16,
                                 number_text(tick, x_.high - x_.low));
         }
         for (const double tick : y_ticks) {
-            if (grid)
-                line(x_.from, y_.at(tick), x_.to, y_.at(tick), "#ececec");
+            if (grid) line(x_.from, y_.at(tick), x_.to, y_.at(tick), "#ececec");
             line(x_.from - 4, y_.at(tick), x_.from, y_.at(tick), "#555");
             svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", x_.from - 7, y_.at(tick) + 4,
                                 number_text(tick, y_.log ? 1e-300 : y_.high - y_.low));
@@ -289,8 +273,7 @@ class Drawing {
     void draw_points(const ChartSeries& series) {
         std::string markup;
         for (std::size_t i = 0; i < series.x.size(); ++i) {
-            if (!can_draw(series, i))
-                continue;
+            if (!can_draw(series, i)) continue;
             const double x = x_.at(series.x[i]), y = y_.at(series.y[i]);
             if (!series.x_error.empty())
                 markup +=
@@ -311,8 +294,7 @@ class Drawing {
 
     /// About each x, which are evenly spaced, up from 0.
     void draw_bars(const ChartSeries& series) {
-        if (series.x.size() < 2)
-            return;
+        if (series.x.size() < 2) return;
         const double half = 0.5 * (series.x[1] - series.x[0]);
         for (std::size_t i = 0; i < series.x.size(); ++i)
             if (can_draw(series, i) && series.y[i] != 0)
@@ -341,17 +323,14 @@ std::string draw(const Chart& chart) { return Drawing(chart).figure(); }
 ScaledUnit unit_for(const std::vector<double>& values, const std::vector<ScaledUnit>& choices) {
     double largest = 0;
     for (const double value : values)
-        if (std::isfinite(value))
-            largest = std::max(largest, std::abs(value));
+        if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
     for (const ScaledUnit& choice : choices)
-        if (largest >= choice.factor)
-            return choice;
+        if (largest >= choice.factor) return choice;
     return largest > 0 ? choices.back() : choices.front();
 }
 
 std::vector<double> scaled(std::vector<double> values, const ScaledUnit& unit) {
-    for (double& value : values)
-        value /= unit.factor;
+    for (double& value : values) value /= unit.factor;
     return values;
 }
 

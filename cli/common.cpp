@@ -22,11 +22,12 @@ constexpr int most_threads = 4096;  // more is a slip of the finger
 
 void add_common_options(CLI::App& command, CommonOptions& common) {
     common.threads = std::min(cores_of_rank(), most_threads);
-    command
-        .add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
+    command.add_option("--set", common.settings, "Override a key of the file, as in materials.EW.toughness=\"120 J/m^2\"")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false);
-    command.add_option("--threads", common.threads, "Forward runs side by side in a fit, or threads in a step of explicit dynamics; all cores unless told")
+    command
+        .add_option("--threads", common.threads,
+                    "Forward runs side by side in a fit, or threads in a step of explicit dynamics; all cores unless told")
         ->type_name("N")
         ->check(CLI::Range(1, most_threads));
     command.add_flag("--quiet", common.quiet, "No progress on standard error");
@@ -37,16 +38,14 @@ Overrides overrides_of(const CommonOptions& common) {
     Overrides overrides;
     for (const std::string& setting : common.settings) {
         const std::size_t equals = setting.find('=');
-        if (equals == std::string::npos || equals == 0)
-            throw InputError("command line", "--set", setting, "must be KEY=VALUE");
+        if (equals == std::string::npos || equals == 0) throw InputError("command line", "--set", setting, "must be KEY=VALUE");
         overrides.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
     }
     return overrides;
 }
 
 void check_output(const std::filesystem::path& output, const std::filesystem::path& input) {
-    if (output.empty())
-        throw InputError("command line", "-o", "", "must be the name of a file");
+    if (output.empty()) throw InputError("command line", "-o", "", "must be the name of a file");
     std::error_code neither_exists;
     if (std::filesystem::equivalent(output, input, neither_exists))
         throw InputError("command line", "-o", output.string(), "must not be the file that is read");
@@ -63,8 +62,7 @@ void print(const std::string& text) {
 
 void report(const CommonOptions& common, const std::string& line) {
     spdlog::info(line);
-    if (!common.quiet)
-        complain(line);
+    if (!common.quiet) complain(line);
 }
 
 }  // namespace crampfit::cli

@@ -19,8 +19,16 @@ ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, c
     const std::optional<double> pixel = pixel_of(pictures);
     const Correlator correlator = make_correlator(pictures, common);
     const FinePicture reference = read_reference(pictures);
-    FieldSeries series{pictures.reference.string(), names_of(pictures), correlator.lattice(), pictures.options.subset,
-                       pictures.options.order, pixel, reference.columns, reference.rows, {}, {}};
+    FieldSeries series{pictures.reference.string(),
+                       names_of(pictures),
+                       correlator.lattice(),
+                       pictures.options.subset,
+                       pictures.options.order,
+                       pixel,
+                       reference.columns,
+                       reference.rows,
+                       {},
+                       {}};
     const PictureInstants instants = read_picture_times(times, series.images.size(), common);
     series.time = instants.time;
     series.displacement = instants.displacement;
@@ -32,8 +40,7 @@ ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, c
     std::optional<DisplacementField> last;
     const int count = static_cast<int>(pictures.images.size());
     const auto next_field = [&](int image) -> std::optional<DisplacementField> {
-        if (stop_requested())
-            return std::nullopt;
+        if (stop_requested()) return std::nullopt;
         last = correlator.field(read_image(pictures, image));
         followed += std::ranges::count(last->status, PointStatus::ok);
         done = image + 1;
@@ -41,8 +48,7 @@ ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, c
         return last;
     };
     write_fields(series, next_field, pictures.output);
-    if (!pictures.preview.empty() && last)
-        draw_field(reference, series.lattice, *last, pictures.preview);
+    if (!pictures.preview.empty() && last) draw_field(reference, series.lattice, *last, pictures.preview);
     report(common, fmt::format("{} of {} points in {} images followed, saved as {}", followed,
                                static_cast<long>(series.lattice.count()) * done, done, pictures.output.string()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;

@@ -18,9 +18,7 @@ struct Arguments {
 Verb csv_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
     CLI::App* verb = command.add_subcommand("csv", "Print a table of a result as CSV");
-    verb->add_option("file", arguments->file, "What a verb of this command has saved")
-        ->type_name("FILE.h5")
-        ->required();
+    verb->add_option("file", arguments->file, "What a verb of this command has saved")->type_name("FILE.h5")->required();
     verb->add_option("table", arguments->table, "Which table; an unknown name lists those that there are")
         ->type_name("TABLE")
         ->required();

@@ -74,12 +74,11 @@ bool asks_for(const DakotaRequest& request, DakotaRequest::Active what) {
 std::string evaluate(const Study& study, const DakotaRequest& request, const Point& point, const CommonOptions& common,
                      const std::filesystem::path& results) {
     const bool of_outputs = !study.outputs.empty();
-    if (asks_for(request, DakotaRequest::hessian))
-        return "Hessians were asked for, and there are none";
-    const StudyFunction function = of_outputs ? output_function(study, &stop_requested()) : fit_function(study, &stop_requested());
+    if (asks_for(request, DakotaRequest::hessian)) return "Hessians were asked for, and there are none";
+    const StudyFunction function =
+        of_outputs ? output_function(study, &stop_requested()) : fit_function(study, &stop_requested());
     const Evaluation evaluation = function(point.values, common.threads);
-    if (!evaluation.usable())
-        return evaluation.status;
+    if (!evaluation.usable()) return evaluation.status;
     Eigen::VectorXd values = evaluation.residuals;
     const bool misfit = !of_outputs && request.active.size() == 1;
     if (!misfit && static_cast<std::size_t>(values.size()) != request.active.size())
@@ -88,20 +87,19 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
                                      of_outputs ? "" : "; or ask for one, the sum of their squares"));
     Eigen::MatrixXd slopes;  // [functions x parameters]
     if (asks_for(request, DakotaRequest::gradient)) {
-        const auto found = of_outputs ? output_slopes(study, point.values, &stop_requested()) : fit_slopes(study, point.values, &stop_requested());
-        if (!found)
-            return "gradients were asked for, and the solver has none that hold for this study: see crampfit explain";
+        const auto found = of_outputs ? output_slopes(study, point.values, &stop_requested())
+                                      : fit_slopes(study, point.values, &stop_requested());
+        if (!found) return "gradients were asked for, and the solver has none that hold for this study: see crampfit explain";
         slopes = misfit ? Eigen::MatrixXd(2.0 * values.transpose() * *found) : *found;
     }
-    if (misfit)
-        values = Eigen::VectorXd::Constant(1, evaluation.misfit);
-    if (!values.allFinite() || !slopes.allFinite())
-        return "the run has no such output";
+    if (misfit) values = Eigen::VectorXd::Constant(1, evaluation.misfit);
+    if (!values.allFinite() || !slopes.allFinite()) return "the run has no such output";
     std::vector<std::vector<double>> gradients(request.active.size());
     for (std::size_t k = 0; k < gradients.size() && slopes.size() > 0; ++k)
         for (const std::size_t variable : request.derivative_variables) {
             const std::size_t j = point.parameters[variable];
-            gradients[k].push_back(slopes(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) * study.parameters[j].unit_factor);
+            gradients[k].push_back(slopes(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) *
+                                   study.parameters[j].unit_factor);
         }
     write_dakota_results(request, {values.begin(), values.end()}, gradients, results);
     return "";
@@ -111,9 +109,9 @@ ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& co
     check_output(arguments.results, arguments.study);
     const DakotaRequest request = read_dakota_request(arguments.parameters);
     const Study study = open_study(arguments.study, common);
-    const std::string failure = evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
-    if (failure.empty())
-        return ExitStatus::done;
+    const std::string failure =
+        evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
+    if (failure.empty()) return ExitStatus::done;
     write_dakota_failure(failure, arguments.results);
     report(common, "failed: " + failure);
     return stop_requested() ? ExitStatus::interrupted : ExitStatus::incomplete;
@@ -123,7 +121,8 @@ ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& co
 
 Verb evaluate_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<Arguments>();
-    CLI::App* verb = command.add_subcommand("evaluate", "Evaluate a study once, for Dakota: its parameters file in, its results file out");
+    CLI::App* verb =
+        command.add_subcommand("evaluate", "Evaluate a study once, for Dakota: its parameters file in, its results file out");
     verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();
     verb->add_option("parameters", arguments->parameters, "What Dakota asks for, in its standard or its APREPRO format")
         ->type_name("PARAMS.in")

@@ -43,31 +43,29 @@ Fit run(const Study& study, const StudyArguments& arguments, const CommonOptions
 void serve(const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
     std::optional<Study> study;
     ranks.serve([&](int model) {
-        if (!study)
-            study = open_study(arguments.study, common);
-        return fit_function(study->models.empty() ? *study : model_of(*study, static_cast<std::size_t>(model)), &stop_requested());
+        if (!study) study = open_study(arguments.study, common);
+        return fit_function(study->models.empty() ? *study : model_of(*study, static_cast<std::size_t>(model)),
+                            &stop_requested());
     });
 }
 
 /// The result for a person; `crampfit csv FIT.h5 parameters` prints all digits.
 std::string table_text(const Fit& fit) {
     std::size_t width = std::string("parameter").size();
-    for (const FittedParameter& parameter : fit.parameters)
-        width = std::max(width, parameter.name.size());
-    std::string text = fmt::format("{:<{}}  {:>11}  {:>14}  {:>23}  unit\n", "parameter", width, "value",
-                                   "standard error", "95 % interval");
+    for (const FittedParameter& parameter : fit.parameters) width = std::max(width, parameter.name.size());
+    std::string text =
+        fmt::format("{:<{}}  {:>11}  {:>14}  {:>23}  unit\n", "parameter", width, "value", "standard error", "95 % interval");
     for (const FittedParameter& parameter : fit.parameters)
         text += fmt::format("{:<{}}  {:>11.4g}  {:>14.3g}  {:>23}  {}{}\n", parameter.name, width, parameter.value,
-                            parameter.standard_error,
-                            fmt::format("{:.4g} .. {:.4g}", parameter.lower_95, parameter.upper_95), parameter.unit,
-                            parameter.at_bound ? "  (at a bound)" : "");
+                            parameter.standard_error, fmt::format("{:.4g} .. {:.4g}", parameter.lower_95, parameter.upper_95),
+                            parameter.unit, parameter.at_bound ? "  (at a bound)" : "");
     for (const ComparedModel& model : fit.models) {
         const SimulatedPath path = together(fit, model.name);
-        const std::string off = path.compared_length > 0 ? fmt::format("  path off by {:.3g} mm on average, {:.3g} mm at most", 1e3 * path.mean_distance,
-                                                                       1e3 * path.largest_distance)
+        const std::string off = path.compared_length > 0 ? fmt::format("  path off by {:.3g} mm on average, {:.3g} mm at most",
+                                                                       1e3 * path.mean_distance, 1e3 * path.largest_distance)
                                                          : "";
-        text += fmt::format("{:<24}  misfit {:>9.4g}  AIC {:>9.4g}  BIC {:>9.4g}  weight {:.3g}{}\n", model.name, model.misfit, model.aic,
-                            model.bic, model.weight, off);
+        text += fmt::format("{:<24}  misfit {:>9.4g}  AIC {:>9.4g}  BIC {:>9.4g}  weight {:.3g}{}\n", model.name, model.misfit,
+                            model.aic, model.bic, model.weight, off);
     }
     return text;
 }
@@ -83,8 +81,7 @@ ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& co
     const Fit fit = run(study, arguments, common, ranks);
     write(fit, arguments.output);
     double of_runs = 0;
-    for (const auto& run : fit.runs)
-        of_runs += run.seconds;
+    for (const auto& run : fit.runs) of_runs += run.seconds;
     report(common, fmt::format("{}: {}; {} runs in {}, each by itself {} in all, saved as {}", name(fit.status), fit.message,
                                fit.runs.size(), duration_text(fit.seconds), duration_text(of_runs), arguments.output.string()));
     print(table_text(fit));

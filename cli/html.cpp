@@ -73,15 +73,12 @@ const char* const script = R"(
 std::size_t character_length(std::string_view text) {
     const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
     const unsigned first = byte(0);
-    if (first < 0x80)
-        return first >= 0x20 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
-    if (first < 0xC2 || first > 0xF4)
-        return 0;
+    if (first < 0x80) return first >= 0x20 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
+    if (first < 0xC2 || first > 0xF4) return 0;
     const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
     unsigned code = first & (0xFFu >> (length + 1));
     for (std::size_t i = 1; i < length; ++i) {
-        if ((byte(i) & 0xC0u) != 0x80u)
-            return 0;
+        if ((byte(i) & 0xC0u) != 0x80u) return 0;
         code = code << 6 | (byte(i) & 0x3Fu);
     }
     const unsigned least = length == 2 ? 0x80 : length == 3 ? 0x800 : 0x10000;
@@ -134,10 +131,8 @@ std::string png_address(const std::vector<std::uint8_t>& bytes) {
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
         const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
         unsigned bits = 0;
-        for (std::size_t k = 0; k < 3; ++k)
-            bits = bits << 8 | (k < count ? bytes[i + k] : 0u);
-        for (std::size_t k = 0; k < 4; ++k)
-            text += k <= count ? digits[bits >> (18 - 6 * k) & 63u] : '=';
+        for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (k < count ? bytes[i + k] : 0u);
+        for (std::size_t k = 0; k < 4; ++k) text += k <= count ? digits[bits >> (18 - 6 * k) & 63u] : '=';
     }
     return text;
 }
@@ -152,16 +147,14 @@ std::string verbatim(const std::string& text) { return fmt::format("<pre>{}</pre
 
 std::string facts(const std::vector<std::pair<std::string, std::string>>& texts) {
     std::string markup = "<dl>\n";
-    for (const auto& [name, value] : texts)
-        markup += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value));
+    for (const auto& [name, value] : texts) markup += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value));
     return markup + "</dl>\n";
 }
 
 std::string table(const std::string& caption_text, const std::vector<std::string>& heads,
                   const std::vector<std::vector<std::string>>& rows) {
     std::string markup = fmt::format("<div class=\"scroll\"><table>\n<caption>{}</caption>\n<thead><tr>", escaped(caption_text));
-    for (const std::string& head : heads)
-        markup += fmt::format("<th scope=\"col\">{}</th>", escaped(head));
+    for (const std::string& head : heads) markup += fmt::format("<th scope=\"col\">{}</th>", escaped(head));
     markup += "</tr></thead>\n<tbody>\n";
     for (const std::vector<std::string>& row : rows) {
         markup += "<tr>";
@@ -174,8 +167,7 @@ std::string table(const std::string& caption_text, const std::vector<std::string
 
 std::string figures(const std::vector<std::string>& markups) {
     std::string all = "<div class=\"figures\">\n";
-    for (const std::string& markup : markups)
-        all += markup;
+    for (const std::string& markup : markups) all += markup;
     return all + "</div>\n";
 }
 

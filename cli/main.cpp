@@ -18,8 +18,7 @@ namespace {
 
 /// From here on, what is logged goes to the file of --log.
 void start_log(const CommonOptions& common, const std::vector<std::string>& words) {
-    if (common.log.empty())
-        return;
+    if (common.log.empty()) return;
     try {
         spdlog::set_default_logger(spdlog::basic_logger_mt("file", common.log.string()));
     } catch (const spdlog::spdlog_ex&) {
@@ -34,8 +33,7 @@ void start_log(const CommonOptions& common, const std::vector<std::string>& word
 /// output stays an error.
 void fill_closed_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-        if (::fcntl(stream, F_GETFD) < 0)
-            ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
+        if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
 }
 
 ExitStatus fail(ExitStatus status, const std::string& message) {
@@ -46,16 +44,14 @@ ExitStatus fail(ExitStatus status, const std::string& message) {
 
 /// `--help` and `--version` end the reading as well, with success.
 ExitStatus end_of_reading(const CLI::App& command, const CLI::ParseError& end) {
-    if (end.get_exit_code() != 0)
-        return fail(ExitStatus::bad_input, fmt::format("{} (see crampfit --help)", end.what()));
+    if (end.get_exit_code() != 0) return fail(ExitStatus::bad_input, fmt::format("{} (see crampfit --help)", end.what()));
     command.exit(end);
     return ExitStatus::done;
 }
 
 ExitStatus run_verb(const std::vector<Verb>& verbs) {
     for (const Verb& verb : verbs)
-        if (verb.arguments->parsed())
-            return verb.run();
+        if (verb.arguments->parsed()) return verb.run();
     throw std::logic_error("a command line without a verb was accepted");
 }
 
@@ -64,19 +60,16 @@ ExitStatus run_command(int argc, const char* const* argv) {
     command.set_version_flag("--version", "crampfit " CRAMPFIT_VERSION);
     command.require_subcommand(1);
     command.fallthrough();  // common options may stand after the verb
-    command.footer(
-        "Exit status: 0 done; 1 the run or fit did not reach its end; 2 bad input or usage; 130 interrupted.");
+    command.footer("Exit status: 0 done; 1 the run or fit did not reach its end; 2 bad input or usage; 130 interrupted.");
     CommonOptions common;
     add_common_options(command, common);
-    const std::vector<Verb> verbs{simulate_verb(command, common), explain_verb(command, common),
-                                  fit_verb(command, common), sensitivity_verb(command, common),
-                                  evaluate_verb(command, common), segment_verb(command, common),
-                                  correlate_verb(command, common), track_verb(command, common), camera_verb(command, common),
-                                  csv_verb(command, common), report_verb(command, common),
-                                  bench_verb(command, common)};
+    const std::vector<Verb> verbs{
+        simulate_verb(command, common),    explain_verb(command, common),  fit_verb(command, common),
+        sensitivity_verb(command, common), evaluate_verb(command, common), segment_verb(command, common),
+        correlate_verb(command, common),   track_verb(command, common),    camera_verb(command, common),
+        csv_verb(command, common),         report_verb(command, common),   bench_verb(command, common)};
     for (const Verb& verb : verbs)
-        verb.arguments->footer(
-            "Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
+        verb.arguments->footer("Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
     try {
         command.parse(argc, argv);
     } catch (const CLI::ParseError& end) {

@@ -17,8 +17,10 @@ Curves read_times(const std::filesystem::path& file, std::size_t images) {
     Curves curves = read_curves(file);
     const std::vector<double>& times = curves.time.empty() ? curves.displacement : curves.time;
     if (times.size() != images)
-        throw InputError(file.string(), "time", fmt::format("{} rows", times.size()),
-                         fmt::format("needs a column time [s] or displacement [mm] with a row for each of the {} images, in their order", images));
+        throw InputError(
+            file.string(), "time", fmt::format("{} rows", times.size()),
+            fmt::format("needs a column time [s] or displacement [mm] with a row for each of the {} images, in their order",
+                        images));
     for (std::size_t i = 0; i < curves.time.size(); ++i)
         if (std::isnan(times[i]) || (i > 0 && times[i] < times[i - 1]))
             throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", times[i]),
@@ -27,17 +29,14 @@ Curves read_times(const std::filesystem::path& file, std::size_t images) {
 }
 
 std::optional<double> number_of(const std::string& text, const NumberRule& rule, const char* option) {
-    if (text.empty())
-        return std::nullopt;
+    if (text.empty()) return std::nullopt;
     const double value = parse_quantity(text, rule.dimension, {"command line", option});
-    if (!rule.allows(value))
-        throw InputError("command line", option, text, rule.rule);
+    if (!rule.allows(value)) throw InputError("command line", option, text, rule.rule);
     return value;
 }
 
 void check_load(const Curves& load, const std::filesystem::path& file) {
-    if (load.time.empty())
-        throw InputError(file.string(), "time", "no such column", "the load needs its time");
+    if (load.time.empty()) throw InputError(file.string(), "time", "no such column", "the load needs its time");
     if (load.displacement.empty() && load.force.empty())
         throw InputError(file.string(), "", "", "needs a column displacement or force beside the time");
     for (std::size_t i = 0; i < load.time.size(); ++i)
@@ -49,14 +48,17 @@ void check_load(const Curves& load, const std::filesystem::path& file) {
 }  // namespace
 
 void add_picture_times(CLI::App& verb, PictureTimes& times) {
-    auto* table = verb.add_option("--times", times.times,
-                                  "Table with time [s] of each image, or displacement [mm] of the loading then, or both, a row an image")
-                      ->type_name("TIMES.csv");
-    auto* load = verb.add_option("--load", times.load, "Table with time [s] and displacement [mm], force [N] or both, of the whole test")
-                     ->type_name("LOAD.csv")
-                     ->needs(table);
-    auto* offset = verb.add_option("--offset", times.offset, "Of the images' time 0 on the load's clock, as in \"1.2 s\"; without it, and where "
-                                                             "both tables have a displacement or a force, the clocks are set by that")
+    auto* table =
+        verb.add_option("--times", times.times,
+                        "Table with time [s] of each image, or displacement [mm] of the loading then, or both, a row an image")
+            ->type_name("TIMES.csv");
+    auto* load =
+        verb.add_option("--load", times.load, "Table with time [s] and displacement [mm], force [N] or both, of the whole test")
+            ->type_name("LOAD.csv")
+            ->needs(table);
+    auto* offset = verb.add_option("--offset", times.offset,
+                                   "Of the images' time 0 on the load's clock, as in \"1.2 s\"; without it, and where "
+                                   "both tables have a displacement or a force, the clocks are set by that")
                        ->type_name("TIME")
                        ->needs(load);
     verb.add_option("--trigger", times.trigger, "When the first image was taken, on the load's clock")
@@ -67,12 +69,10 @@ void add_picture_times(CLI::App& verb, PictureTimes& times) {
 }
 
 PictureInstants read_picture_times(const PictureTimes& times, std::size_t images, const CommonOptions& common) {
-    if (times.times.empty())
-        return {};
+    if (times.times.empty()) return {};
     const Curves taken = read_times(times.times, images);
     PictureInstants instants{taken.time, taken.displacement, taken.force, {}};
-    if (times.load.empty())
-        return instants;
+    if (times.load.empty()) return instants;
     if (taken.time.empty())
         throw InputError(times.times.string(), "time", "no such column", "a load is found by the images' time [s]");
     const Curves load = read_curves(times.load);
@@ -81,14 +81,11 @@ PictureInstants read_picture_times(const PictureTimes& times, std::size_t images
                            number_of(times.trigger, limits::finite(dimension::time), "--trigger"),
                            number_of(times.rate, limits::positive(dimension::number), "--rate")};
     const ClockSetting clock = set_clock(taken, load, told, times.times);
-    for (double& time : instants.time)
-        time = clock.offset + clock.rate * time;
+    for (double& time : instants.time) time = clock.offset + clock.rate * time;
     const auto at_images = [&](const std::vector<double>& column, std::vector<double>& to) {
-        if (column.empty())
-            return;
+        if (column.empty()) return;
         to.clear();
-        for (const double time : instants.time)
-            to.push_back(load_at(load.time, column, time));
+        for (const double time : instants.time) to.push_back(load_at(load.time, column, time));
     };
     at_images(load.displacement, instants.displacement);
     at_images(load.force, instants.force);

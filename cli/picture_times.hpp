@@ -15,10 +15,10 @@ void add_picture_times(CLI::App& verb, PictureTimes& times);
 
 /// What is known of each picture then. Columns are empty where it is not.
 struct PictureInstants {
-    std::vector<double> time;          // on the load's clock [s]
-    std::vector<double> displacement;  // of the loading [m]
-    std::vector<double> force;         // [N]
-    std::optional<ClockSetting> clock; // where a load was given
+    std::vector<double> time;           // on the load's clock [s]
+    std::vector<double> displacement;   // of the loading [m]
+    std::vector<double> force;          // [N]
+    std::optional<ClockSetting> clock;  // where a load was given
 };
 
 /// Reads the tables and sets the clocks; reports how. Throws InputError.

@@ -11,13 +11,12 @@
 namespace crampfit::cli {
 
 std::vector<std::uint8_t> read_mask(const std::filesystem::path& file, const FinePicture& reference) {
-    if (file.empty())
-        return {};
+    if (file.empty()) return {};
     GrayPicture mask = read_gray(file, {"command line", "--mask"});
     if (mask.columns != reference.columns || mask.rows != reference.rows)
         throw InputError("command line", "--mask", file.string(),
-                         fmt::format("is {} x {} pixels, the reference {} x {}: must have its size", mask.columns,
-                                     mask.rows, reference.columns, reference.rows));
+                         fmt::format("is {} x {} pixels, the reference {} x {}: must have its size", mask.columns, mask.rows,
+                                     reference.columns, reference.rows));
     if (std::ranges::all_of(mask.gray, [](std::uint8_t gray) { return gray == 0; }))
         throw InputError("command line", "--mask", file.string(), "is black all over: black is left out");
     return std::move(mask.gray);
@@ -47,22 +46,17 @@ void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string
 
 void check_series(const PictureSeries& series, const CommonOptions& common) {
     if (!common.settings.empty())
-        throw InputError("command line", "--set", common.settings.front(),
-                         "has nothing to override here: options say it all");
+        throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
     check_output(series.output, series.reference);
-    for (const std::filesystem::path& image : series.images)
-        check_output(series.output, image);
+    for (const std::filesystem::path& image : series.images) check_output(series.output, image);
     series.options.validate();
-    if (!series.preview.empty())
-        require_picture_name(series.preview, "--preview");
+    if (!series.preview.empty()) require_picture_name(series.preview, "--preview");
 }
 
 std::optional<double> pixel_of(const PictureSeries& series) {
-    if (series.pixel.empty())
-        return std::nullopt;
+    if (series.pixel.empty()) return std::nullopt;
     const double pixel = parse_quantity(series.pixel, limits::pixel.dimension, {"command line", "--pixel"});
-    if (!limits::pixel.allows(pixel))
-        throw InputError("command line", "--pixel", series.pixel, limits::pixel.rule);
+    if (!limits::pixel.allows(pixel)) throw InputError("command line", "--pixel", series.pixel, limits::pixel.rule);
     return pixel;
 }
 
@@ -87,8 +81,7 @@ Correlator make_correlator(const PictureSeries& series, const CommonOptions& com
 
 std::vector<std::string> names_of(const PictureSeries& series) {
     std::vector<std::string> names;
-    for (const std::filesystem::path& image : series.images)
-        names.push_back(image.string());
+    for (const std::filesystem::path& image : series.images) names.push_back(image.string());
     return names;
 }
 

@@ -27,23 +27,18 @@ std::size_t terminal_width() {
 
 /// A number of three digits, as in "12.3k".
 std::string rate_text(double rate) {
-    if (rate >= 1e6)
-        return fmt::format("{:.3g}M", rate / 1e6);
-    if (rate >= 1e3)
-        return fmt::format("{:.3g}k", rate / 1e3);
+    if (rate >= 1e6) return fmt::format("{:.3g}M", rate / 1e6);
+    if (rate >= 1e3) return fmt::format("{:.3g}k", rate / 1e3);
     return fmt::format("{:.3g}", rate);
 }
 
 }  // namespace
 
 std::string duration_text(double seconds) {
-    if (seconds < 9.5)
-        return fmt::format("{:.2g} s", seconds);
+    if (seconds < 9.5) return fmt::format("{:.2g} s", seconds);
     const auto whole = static_cast<long>(std::lround(std::min(seconds, 1e9)));
-    if (whole >= 3600)
-        return fmt::format("{}:{:02} h", whole / 3600, whole / 60 % 60);
-    if (whole >= 60)
-        return fmt::format("{}:{:02} min", whole / 60, whole % 60);
+    if (whole >= 3600) return fmt::format("{}:{:02} h", whole / 3600, whole / 60 % 60);
+    if (whole >= 60) return fmt::format("{}:{:02} min", whole / 60, whole % 60);
     return fmt::format("{} s", whole);
 }
 
@@ -52,23 +47,19 @@ ProgressLine::ProgressLine(const CommonOptions& common, std::string counted)
       last_bar_(started_), last_line_(started_) {}
 
 ProgressLine::~ProgressLine() {
-    if (bar_is_drawn_)
-        std::fputs("\r\033[K", stderr);
+    if (bar_is_drawn_) std::fputs("\r\033[K", stderr);
 }
 
 void ProgressLine::show(double fraction, long count, const std::string& details) {
     const auto now = Clock::now();
     const bool bar_is_due = on_terminal_ && !common_.quiet && now - last_bar_ >= between_bars;
     const bool line_is_due = plain_line_is_due(fraction, now);
-    if (!bar_is_due && !line_is_due)
-        return;
+    if (!bar_is_due && !line_is_due) return;
 
     const double elapsed = std::chrono::duration<double>(now - started_).count();
     std::string text = fmt::format("{:3.0f} %", 100 * fraction);
-    if (elapsed > 0)
-        text += fmt::format("  {} {}/s", rate_text(static_cast<double>(count) / elapsed), counted_);
-    if (fraction > 0)
-        text += fmt::format("  {} left", duration_text(elapsed * (1 - fraction) / fraction));
+    if (elapsed > 0) text += fmt::format("  {} {}/s", rate_text(static_cast<double>(count) / elapsed), counted_);
+    if (fraction > 0) text += fmt::format("  {} left", duration_text(elapsed * (1 - fraction) / fraction));
     text += "  " + details;
 
     if (bar_is_due) {
@@ -77,15 +68,13 @@ void ProgressLine::show(double fraction, long count, const std::string& details)
     }
     if (line_is_due) {
         spdlog::info(text);
-        if (!on_terminal_ && !common_.quiet)
-            complain(text);
+        if (!on_terminal_ && !common_.quiet) complain(text);
     }
 }
 
 bool ProgressLine::plain_line_is_due(double fraction, Clock::time_point now) {
     const int tenths = static_cast<int>(10 * fraction);
-    if (tenths <= tenths_told_ && now - last_line_ < between_lines)
-        return false;
+    if (tenths <= tenths_told_ && now - last_line_ < between_lines) return false;
     tenths_told_ = std::max(tenths_told_, tenths);
     last_line_ = now;
     return true;

@@ -26,8 +26,7 @@ constexpr int farewell = 1'000'001;
 
 bool started_by_mpi() {
     for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"})
-        if (std::getenv(name))
-            return true;
+        if (std::getenv(name)) return true;
     return false;
 }
 
@@ -43,7 +42,8 @@ class Patience {
     std::chrono::microseconds pause_{50};
 };
 
-template <class Number> void put(std::string& bytes, Number number) {
+template <class Number>
+void put(std::string& bytes, Number number) {
     bytes.append(reinterpret_cast<const char*>(&number), sizeof(number));
 }
 
@@ -57,7 +57,8 @@ class Reader {
   public:
     explicit Reader(const std::string& bytes) : bytes_(bytes) {}
 
-    template <class Number> Number number() {
+    template <class Number>
+    Number number() {
         Number number{};
         std::memcpy(&number, bytes_.data() + at_, sizeof(number));
         at_ += sizeof(number);
@@ -111,8 +112,7 @@ std::optional<Message> receive(int rank, int tag) {
     int there = 0, size = 0;
     MPI_Status status;
     MPI_Iprobe(rank, tag, MPI_COMM_WORLD, &there, &status);
-    if (!there)
-        return std::nullopt;
+    if (!there) return std::nullopt;
     MPI_Get_count(&status, MPI_BYTE, &size);
     Message message{status.MPI_TAG, std::string(static_cast<std::size_t>(size), '\0')};
     MPI_Recv(message.bytes.data(), size, MPI_BYTE, status.MPI_SOURCE, status.MPI_TAG, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
@@ -158,8 +158,7 @@ int cores_of_rank() {
 }
 
 Ranks::Ranks(int threads) : threads_(threads) {
-    if (!started_by_mpi())
-        return;
+    if (!started_by_mpi()) return;
     int provided = MPI_THREAD_SINGLE;
     if (MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided) != MPI_SUCCESS || provided < MPI_THREAD_SERIALIZED)
         throw std::runtime_error("MPI could not be started for several threads");
@@ -169,12 +168,10 @@ Ranks::Ranks(int threads) : threads_(threads) {
 }
 
 Ranks::~Ranks() {
-    if (!started_)
-        return;
+    if (!started_) return;
     if (leads()) {
         greet();
-        for (int rank = 1; rank < size_; ++rank)
-            send("", rank, farewell);
+        for (int rank = 1; rank < size_; ++rank) send("", rank, farewell);
     }
     MPI_Finalize();
 }
@@ -186,21 +183,17 @@ void Ranks::greet() {
         }
         Reader reader(hello->bytes);
         const int threads = reader.number<std::int32_t>();
-        if (threads == 0)
-            reasons_.push_back(fmt::format("rank {}: {}", rank, reader.rest()));
-        for (int place = 1; place <= threads; ++place)
-            free_.push_back({rank, place});
+        if (threads == 0) reasons_.push_back(fmt::format("rank {}: {}", rank, reader.rest()));
+        for (int place = 1; place <= threads; ++place) free_.push_back({rank, place});
         count_ += threads;
     }
     greeted_ = true;
 }
 
 Farm* Ranks::farm() {
-    if (size_ == 1)
-        return nullptr;
+    if (size_ == 1) return nullptr;
     greet();
-    if (!reasons_.empty())
-        throw std::runtime_error(reasons_.front());
+    if (!reasons_.empty()) throw std::runtime_error(reasons_.front());
     return this;
 }
 
@@ -232,8 +225,7 @@ Evaluation Ranks::evaluate(const Eigen::VectorXd& values) {
     std::optional<Message> answer;
     for (Patience patience;; patience.wait()) {
         const std::lock_guard lock(mpi_);
-        if ((answer = receive(place.rank, place.tag)))
-            break;
+        if ((answer = receive(place.rank, place.tag))) break;
     }
     leave(place);
     return unpacked(answer->bytes);
@@ -257,8 +249,7 @@ void Ranks::serve(const std::function<StudyFunction(int model)>& prepare) {
     std::map<int, std::jthread> at_work;
     for (Patience patience;; patience.wait()) {
         while (std::optional<Message> request = receive(0, MPI_ANY_TAG)) {
-            if (request->tag == farewell)
-                return;
+            if (request->tag == farewell) return;
             patience = {};
             at_work[request->tag] = std::jthread([&, message = *request] {
                 const Message answer{message.tag, packed(functions.evaluate(message.bytes))};
@@ -271,8 +262,7 @@ void Ranks::serve(const std::function<StudyFunction(int model)>& prepare) {
             const std::lock_guard lock(mutex);
             ready.swap(answers);
         }
-        for (const Message& answer : ready)
-            send(answer.bytes, 0, answer.tag);
+        for (const Message& answer : ready) send(answer.bytes, 0, answer.tag);
     }
 }
 

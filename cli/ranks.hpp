@@ -11,8 +11,8 @@
 
 namespace crampfit::cli {
 
-/// The processes that `mpirun` or `srun` has started with this one. Rank 0 leads: it runs the method, and writes; the others serve it
-/// with forward runs. A process started alone is rank 0 of one, and MPI is not even initialised.
+/// The processes that `mpirun` or `srun` has started with this one. Rank 0 leads: it runs the method, and writes; the others
+/// serve it with forward runs. A process started alone is rank 0 of one, and MPI is not even initialised.
 ///
 /// A rank that is lost takes the others with it, as MPI has it; runs that have ended are kept beside the output.
 class Ranks : private Farm {
@@ -25,12 +25,12 @@ class Ranks : private Farm {
 
     bool leads() const { return rank_ == 0; }
 
-    /// The leader's way to the others, who are waited for; null where it is alone. Throws std::runtime_error with the reason of one
-    /// that cannot serve.
+    /// The leader's way to the others, who are waited for; null where it is alone. Throws std::runtime_error with the reason of
+    /// one that cannot serve.
     Farm* farm();
 
-    /// The others' part: evaluates what the leader asks for, until it lets them go. `prepare` makes the study's function, of one of the
-    /// models that it compares; what it throws the leader is told.
+    /// The others' part: evaluates what the leader asks for, until it lets them go. `prepare` makes the study's function, of one
+    /// of the models that it compares; what it throws the leader is told.
     void serve(const std::function<StudyFunction(int model)>& prepare);
 
   private:

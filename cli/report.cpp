@@ -21,12 +21,9 @@ std::string page_of(const std::filesystem::path& file) {
     const hdf5::Group root = hdf5::open(file);
     const Origin origin{file, root.attribute("version"), root.attribute("created")};
     const std::string kind = root.attribute("kind");
-    if (kind == "record")
-        return record_page(read_record(file), origin);
-    if (kind == "fit")
-        return fit_page(read_fit(file), origin);
-    if (kind == "sensitivity")
-        return sensitivity_page(read_sensitivity(file), origin);
+    if (kind == "record") return record_page(read_record(file), origin);
+    if (kind == "fit") return fit_page(read_fit(file), origin);
+    if (kind == "sensitivity") return sensitivity_page(read_sensitivity(file), origin);
     root.refuse("kind", kind, "must be a record, a fit or a sensitivity study: other results have their preview");
 }
 

@@ -38,19 +38,16 @@ std::vector<Comparison> comparisons(const Fit& fit) {
     for (const FitResidual& row : fit.residuals) {
         const auto same = [&](const Comparison& other) { return other.experiment == row.experiment && other.kind == row.kind; };
         auto found = std::ranges::find_if(all, same);
-        if (found == all.end())
-            found = all.insert(all.end(), {row.experiment, row.kind, {}});
+        if (found == all.end()) found = all.insert(all.end(), {row.experiment, row.kind, {}});
         found->rows.push_back(row);
     }
-    for (Comparison& comparison : all)
-        std::ranges::stable_sort(comparison.rows, {}, &FitResidual::at);
+    for (Comparison& comparison : all) std::ranges::stable_sort(comparison.rows, {}, &FitResidual::at);
     return all;
 }
 
 std::vector<double> column(const Comparison& comparison, double FitResidual::*member) {
     std::vector<double> values;
-    for (const FitResidual& row : comparison.rows)
-        values.push_back(row.*member);
+    for (const FitResidual& row : comparison.rows) values.push_back(row.*member);
     return values;
 }
 
@@ -62,7 +59,8 @@ std::string field_figure(const Comparison& comparison) {
     return draw({.title = fmt::format("{}: {} of the displacement fields", comparison.experiment, comparison.kind),
                  .x_label = "Fitted [um]",
                  .y_label = "Measured [um]",
-                 .series = {{.colour = colour::black, .kind = Kind::points,
+                 .series = {{.colour = colour::black,
+                             .kind = Kind::points,
                              .x = scaled(column(comparison, &FitResidual::modelled), micrometre),
                              .y = scaled(column(comparison, &FitResidual::measured), micrometre)}}});
 }
@@ -98,7 +96,9 @@ std::string residuals_figure(const Comparison& comparison) {
     const std::vector<double> at = scaled(column(comparison, field ? &FitResidual::modelled : &FitResidual::at), {1e-3, "mm"});
     return draw(
         {.title = fmt::format("{}: residuals of {}", comparison.experiment, comparison.kind),
-         .x_label = arrival ? "Crack length [mm]" : field ? "Displacement of the point, fitted [mm]" : "Displacement [mm]",
+         .x_label = arrival ? "Crack length [mm]"
+                    : field ? "Displacement of the point, fitted [mm]"
+                            : "Displacement [mm]",
          .y_label = "(fitted − measured) / sigma [–]",
          .series = {{.colour = colour::blue, .kind = Kind::points, .x = at, .y = column(comparison, &FitResidual::residual)}},
          .y_levels = {-2, 0, 2}});
@@ -110,8 +110,7 @@ std::string comparisons_section(const Fit& fit) {
         drawings.push_back(is_field(comparison) ? field_figure(comparison) : comparison_figure(comparison));
         drawings.push_back(residuals_figure(comparison));
     }
-    if (drawings.empty())
-        return {};
+    if (drawings.empty()) return {};
     return section(
         "Data against model",
         paragraph("At the best parameters. Of residuals that are noise, 95 of 100 lie between the outer dashed lines. Data "
@@ -120,8 +119,7 @@ std::string comparisons_section(const Fit& fit) {
 }
 
 std::string checks_section(const Fit& fit) {
-    if (fit.checks.empty())
-        return {};
+    if (fit.checks.empty()) return {};
     std::vector<std::vector<std::string>> rows;
     for (const FitCheck& check : fit.checks)
         rows.push_back({check.experiment, check.kind, std::to_string(check.points), fmt::format("{:.4g}", check.chi_square),
@@ -133,26 +131,25 @@ std::string checks_section(const Fit& fit) {
 }
 
 std::string distances_section(const Fit& fit) {
-    if (fit.distances.empty())
-        return {};
+    if (fit.distances.empty()) return {};
     std::vector<std::vector<std::string>> rows;
     for (const CurveDistance& distance : fit.distances)
         rows.push_back({distance.experiment, distance.kind, fmt::format("{:.4g}", distance.area_measured),
                         fmt::format("{:.4g}", distance.area_modelled), fmt::format("{:.3g}", distance.area_between),
                         fmt::format("{:.3g}", distance.frechet)});
-    return section("How far the curves are apart",
-                   table("Areas in SI: under force over displacement it is the work in J. Frechet distance with both axes divided by the "
-                         "measured range. The fit does not rest on these.",
-                         {"Experiment", "Curve", "Area, measured", "Area, modelled", "Area between", "Frechet distance"}, rows));
+    return section(
+        "How far the curves are apart",
+        table("Areas in SI: under force over displacement it is the work in J. Frechet distance with both axes divided by the "
+              "measured range. The fit does not rest on these.",
+              {"Experiment", "Curve", "Area, measured", "Area, modelled", "Area between", "Frechet distance"}, rows));
 }
 
 std::string models_section(const Fit& fit) {
-    if (fit.models.empty())
-        return {};
+    if (fit.models.empty()) return {};
     std::vector<std::string> heads{"Model", "Ended", "Misfit", "AIC", "BIC", "Weight"};
-    const bool photographed = std::ranges::any_of(fit.crack_paths, [](const CrackPaths& paths) { return !paths.photographed.empty(); });
-    if (photographed)
-        heads.insert(heads.end(), {"Path off by, mean [mm]", "At most [mm]"});
+    const bool photographed =
+        std::ranges::any_of(fit.crack_paths, [](const CrackPaths& paths) { return !paths.photographed.empty(); });
+    if (photographed) heads.insert(heads.end(), {"Path off by, mean [mm]", "At most [mm]"});
     std::vector<std::vector<std::string>> rows;
     for (const ComparedModel& model : fit.models) {
         rows.push_back({model.name, model.status, fmt::format("{:.4g}", model.misfit), fmt::format("{:.4g}", model.aic),
@@ -161,10 +158,12 @@ std::string models_section(const Fit& fit) {
         if (photographed)
             rows.back().insert(rows.back().end(), {millimetres(all.mean_distance), millimetres(all.largest_distance)});
     }
-    return section("Which model the data speak for",
-                   table("The best one first; parameters, curves and intervals on this page are its. Akaike weights share out the evidence of "
-                         "the data; photographed paths are no part of it.",
-                         heads, rows));
+    return section(
+        "Which model the data speak for",
+        table(
+            "The best one first; parameters, curves and intervals on this page are its. Akaike weights share out the evidence of "
+            "the data; photographed paths are no part of it.",
+            heads, rows));
 }
 
 // ---- parameters
@@ -191,8 +190,7 @@ std::string profiles_section(const Fit& fit) {
                 series.x.push_back(point.value);
                 series.y.push_back(point.misfit - fit.misfit);
             }
-        if (series.x.empty())
-            continue;
+        if (series.x.empty()) continue;
         ChartSeries points = series;
         points.kind = Kind::points;
         drawings.push_back(draw({.title = "Profile of " + parameter.name,
@@ -210,8 +208,7 @@ std::string profiles_section(const Fit& fit) {
 
 std::vector<double> samples_of(const Fit& fit, std::size_t parameter) {
     std::vector<double> values;
-    for (const PosteriorSample& sample : fit.posterior)
-        values.push_back(sample.parameters[parameter]);
+    for (const PosteriorSample& sample : fit.posterior) values.push_back(sample.parameters[parameter]);
     return values;
 }
 
@@ -219,14 +216,11 @@ std::string histogram(const FittedParameter& parameter, const std::vector<double
     const auto [low, high] = std::ranges::minmax(values);
     const auto bins = static_cast<std::size_t>(std::clamp(std::sqrt(static_cast<double>(values.size())), 5.0, 40.0));
     const double width = (high - low) / static_cast<double>(bins);
-    if (!(width > 0) || !std::isfinite(width))
-        return {};
+    if (!(width > 0) || !std::isfinite(width)) return {};
     ChartSeries series{.colour = colour::blue, .kind = Kind::bars, .x = {}, .y = std::vector<double>(bins, 0.0)};
-    for (std::size_t i = 0; i < bins; ++i)
-        series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
+    for (std::size_t i = 0; i < bins; ++i) series.x.push_back(low + (static_cast<double>(i) + 0.5) * width);
     for (const double value : values)
-        if (std::isfinite(value))
-            ++series.y[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))];
+        if (std::isfinite(value)) ++series.y[std::min(bins - 1, static_cast<std::size_t>((value - low) / width))];
     return draw({.title = "Posterior of " + parameter.name,
                  .x_label = with_unit(parameter.name, parameter.unit),
                  .y_label = "Samples [–]",
@@ -235,8 +229,7 @@ std::string histogram(const FittedParameter& parameter, const std::vector<double
 }
 
 std::string posterior_section(const Fit& fit) {
-    if (fit.posterior.empty())
-        return {};
+    if (fit.posterior.empty()) return {};
     std::vector<std::string> drawings;
     std::vector<std::vector<double>> samples;
     for (std::size_t i = 0; i < fit.parameters.size(); ++i)
@@ -271,8 +264,7 @@ std::string correlation_colour(double value) {
 }
 
 std::string correlation_section(const Fit& fit) {
-    if (fit.correlation.size() == 0)
-        return section("Correlation", paragraph("There is no estimate of the covariance."));
+    if (fit.correlation.size() == 0) return section("Correlation", paragraph("There is no estimate of the covariance."));
     std::string markup = "<div class=\"scroll\"><table>\n<caption>Near 1 or −1: the data hardly tell the two "
                          "apart</caption>\n<thead><tr><td></td>";
     for (const FittedParameter& parameter : fit.parameters)
@@ -291,8 +283,7 @@ std::string correlation_section(const Fit& fit) {
 // ---- runs
 
 std::string runs_section(const Fit& fit) {
-    if (fit.runs.empty())
-        return {};
+    if (fit.runs.empty()) return {};
     ChartSeries runs{.label = "a run", .colour = colour::black, .kind = Kind::points};
     ChartSeries best{.label = "best so far", .colour = colour::vermillion};
     std::map<std::string, int> ends;
@@ -309,8 +300,7 @@ std::string runs_section(const Fit& fit) {
     }
     best.x = runs.x;
     std::vector<std::vector<std::string>> rows;
-    for (const auto& [status, count] : ends)
-        rows.push_back({status, std::to_string(count)});
+    for (const auto& [status, count] : ends) rows.push_back({status, std::to_string(count)});
     return section("Runs", figures({draw({.title = "Misfit of each forward run",
                                           .x_label = "Forward run [–]",
                                           .y_label = "Misfit [–]",
@@ -324,11 +314,9 @@ std::string summary(const Fit& fit) {
     std::string markup;
     if (!lack_of_fit(fit.checks).empty() || fit.status != FitStatus::converged)
         markup += fmt::format("<p class=\"warning\">{}</p>\n", escaped(fit.message));
-    else
-        markup += paragraph(fit.message);
+    else markup += paragraph(fit.message);
     double seconds = 0;
-    for (const FitRun& run : fit.runs)
-        seconds += run.seconds;
+    for (const FitRun& run : fit.runs) seconds += run.seconds;
     return markup + facts({{"Ended", name(fit.status)},
                            {"Method", fit.method},
                            {"Misfit", fmt::format("{:.4g}, sum of squared weighted residuals; {:.3g} for each degree of freedom",
@@ -342,9 +330,10 @@ std::string summary(const Fit& fit) {
 
 std::string fit_page(const Fit& fit, const Origin& origin) {
     const std::string title = title_of(fit.study_text, origin);
-    return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) + paths_section(fit) +
-                           comparisons_section(fit) + checks_section(fit) + distances_section(fit) + correlation_section(fit) + profiles_section(fit) + posterior_section(fit) +
-                           runs_section(fit) + repeat_section(fit.study_text, "fit", "study.toml", origin));
+    return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) +
+                           paths_section(fit) + comparisons_section(fit) + checks_section(fit) + distances_section(fit) +
+                           correlation_section(fit) + profiles_section(fit) + posterior_section(fit) + runs_section(fit) +
+                           repeat_section(fit.study_text, "fit", "study.toml", origin));
 }
 
 }  // namespace crampfit::cli

@@ -11,8 +11,7 @@ namespace crampfit::cli {
 std::string title_of(const std::string& toml, const Origin& origin) {
     try {
         const Document document(toml, origin.file, {});
-        if (const auto title = document.root().find("title"); title && title->is_text())
-            return title->text();
+        if (const auto title = document.root().find("title"); title && title->is_text()) return title->text();
     } catch (const InputError&) {
         // A result without its input can be looked at all the same.
     }

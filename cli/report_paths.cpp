@@ -24,8 +24,8 @@ constexpr double least_aspect = 0.5;                   // of a close-up, shorter
 struct Sight {
     const CrackPaths* paths;
     std::string title;
-    Vec2 low, high;                    // corners [m]
-    std::vector<std::size_t> models;   // by their place in `paths->simulated`
+    Vec2 low, high;                   // corners [m]
+    std::vector<std::size_t> models;  // by their place in `paths->simulated`
 };
 
 const char* colour_of(std::size_t model) {
@@ -45,27 +45,28 @@ std::pair<Vec2, Vec2> corners_about(const CrackPaths& paths, const std::vector<s
         }
     };
     include(paths.photographed);
-    for (const std::size_t model : models)
-        std::ranges::for_each(paths.simulated[model].cracks, include);
+    for (const std::size_t model : models) std::ranges::for_each(paths.simulated[model].cracks, include);
     const double longer = (high - low).maxCoeff();
     const Vec2 margin = (0.5 * (Vec2::Constant(least_aspect * longer) - (high - low))).cwiseMax(around * longer);
     return {(low - margin).cwiseMax(paths.picture.low), (high + margin).cwiseMin(paths.picture.high)};
 }
 
 bool any_path(const CrackPaths& paths) {
-    return !paths.photographed.empty() || std::ranges::any_of(paths.simulated, [](const SimulatedPath& s) { return !s.cracks.empty(); });
+    return !paths.photographed.empty() ||
+           std::ranges::any_of(paths.simulated, [](const SimulatedPath& s) { return !s.cracks.empty(); });
 }
 
 /// All paths over the whole specimen, then each over the photographed one, near by.
 std::vector<Sight> sights_of(const CrackPaths& paths) {
     std::vector<std::size_t> all;
-    for (std::size_t i = 0; i < paths.simulated.size(); ++i)
-        all.push_back(i);
-    std::vector<Sight> sights{{&paths, paths.experiment + (paths.on_photograph ? ": photograph" : ": wood of the model"), paths.picture.low, paths.picture.high, all}};
+    for (std::size_t i = 0; i < paths.simulated.size(); ++i) all.push_back(i);
+    std::vector<Sight> sights{{&paths, paths.experiment + (paths.on_photograph ? ": photograph" : ": wood of the model"),
+                               paths.picture.low, paths.picture.high, all}};
     const auto [low, high] = corners_about(paths, all);
     for (const std::size_t model : all)
         if (!paths.simulated[model].cracks.empty() && (low.array() < high.array()).all())
-            sights.push_back({&paths, fmt::format("{}: {}", paths.experiment, label_of(paths.simulated[model])), low, high, {model}});
+            sights.push_back(
+                {&paths, fmt::format("{}: {}", paths.experiment, label_of(paths.simulated[model])), low, high, {model}});
     return sights;
 }
 
@@ -77,7 +78,8 @@ std::vector<std::uint8_t> cut_out(Sight& sight, int longer_side) {
     const Vec2 first = (sight.low - picture.low).cwiseQuotient(pixel), last = (sight.high - picture.low).cwiseQuotient(pixel);
     const int left = static_cast<int>(std::floor(first.x())), right = static_cast<int>(std::ceil(last.x()));
     const int bottom = static_cast<int>(std::floor(first.y())), top = static_cast<int>(std::ceil(last.y()));
-    const cv::Rect part = cv::Rect(cv::Point(left, picture.rows - top), cv::Point(right, picture.rows - bottom)) & cv::Rect({0, 0}, whole.size());
+    const cv::Rect part =
+        cv::Rect(cv::Point(left, picture.rows - top), cv::Point(right, picture.rows - bottom)) & cv::Rect({0, 0}, whole.size());
     sight.low = picture.low + pixel.cwiseProduct(Vec2(part.x, picture.rows - part.y - part.height));
     sight.high = picture.low + pixel.cwiseProduct(Vec2(part.x + part.width, picture.rows - part.y));
     cv::Mat shown = whole(part);
@@ -117,8 +119,7 @@ std::vector<std::string> draw_sights(std::vector<Sight> sights) {
             bytes += png.size();
             drawings.push_back(figure(sight, png));
         }
-        if (bytes <= most_picture_bytes || pixels < 2)
-            return drawings;
+        if (bytes <= most_picture_bytes || pixels < 2) return drawings;
         pixels *= std::min(0.9, std::sqrt(static_cast<double>(most_picture_bytes) / static_cast<double>(bytes)));
     }
 }
@@ -127,8 +128,8 @@ std::string distances_table(const std::vector<CrackPaths>& all) {
     std::vector<std::vector<std::string>> rows;
     for (const CrackPaths& paths : all)
         for (const SimulatedPath& simulated : paths.simulated)
-            rows.push_back({paths.experiment, label_of(simulated), millimetres(simulated.mean_distance), millimetres(simulated.largest_distance),
-                            millimetres(simulated.compared_length), simulated.status});
+            rows.push_back({paths.experiment, label_of(simulated), millimetres(simulated.mean_distance),
+                            millimetres(simulated.largest_distance), millimetres(simulated.compared_length), simulated.status});
     return table("Distance of the photographed path from the simulated one, where both have grown",
                  {"Experiment", "Path", "Mean [mm]", "Largest [mm]", "Over [mm]", "Its run ended"}, rows);
 }
@@ -146,11 +147,11 @@ std::string paths_section(const Fit& fit) {
             tracked = tracked || !paths.photographed.empty();
             on_photograph = on_photograph || paths.on_photograph;
         }
-    if (sights.empty())
-        return {};
+    if (sights.empty()) return {};
     const std::string where = on_photograph ? " A photograph under load shows a gap beside the place where the wood parted." : "";
     return section("Crack paths", paragraph("At the best parameters, in the undeformed specimen." + where) +
-                                      (tracked ? distances_table(fit.crack_paths) : "") + figures(draw_sights(std::move(sights))));
+                                      (tracked ? distances_table(fit.crack_paths) : "") +
+                                      figures(draw_sights(std::move(sights))));
 }
 
 }  // namespace crampfit::cli

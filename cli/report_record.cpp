@@ -17,8 +17,7 @@ using Kind = ChartSeries::Kind;
 
 std::vector<double> column(const Record& record, double Instant::*member) {
     std::vector<double> values;
-    for (const Instant& instant : record.series)
-        values.push_back(instant.*member);
+    for (const Instant& instant : record.series) values.push_back(instant.*member);
     return values;
 }
 
@@ -45,8 +44,7 @@ Abscissa over_time(const Record& record) {
 /// Whether displacement says the time: then one set of curves is enough.
 bool is_steady(const Record& record) {
     const Instant& end = record.series.back();
-    if (!(std::abs(end.displacement) > 0 && end.time > 0))
-        return false;
+    if (!(std::abs(end.displacement) > 0 && end.time > 0)) return false;
     return std::ranges::all_of(record.series, [&](const Instant& instant) {
         return std::abs(instant.displacement / end.displacement - instant.time / end.time) < 0.01;
     });
@@ -78,8 +76,7 @@ void add_frame_marks(Chart& chart, const Record& record, const Abscissa& absciss
 Chart chart_of(const Record& record, const Abscissa& abscissa, const std::string& title, const std::vector<ScaledUnit>& choices,
                const std::vector<Quantity>& quantities) {
     std::vector<double> all;
-    for (const Quantity& quantity : quantities)
-        std::ranges::copy(column(record, quantity.member), std::back_inserter(all));
+    for (const Quantity& quantity : quantities) std::ranges::copy(column(record, quantity.member), std::back_inserter(all));
     const ScaledUnit unit = unit_for(all, choices);
     Chart chart{.title = title, .x_label = abscissa.label, .y_label = fmt::format("{} [{}]", title, unit.symbol)};
     for (const Quantity& quantity : quantities)
@@ -88,8 +85,7 @@ Chart chart_of(const Record& record, const Abscissa& abscissa, const std::string
                                 .kind = quantity.kind,
                                 .x = abscissa.values,
                                 .y = scaled(column(record, quantity.member), unit)});
-    if (quantities.size() == 1)
-        add_frame_marks(chart, record, abscissa, quantities.front().member, unit);
+    if (quantities.size() == 1) add_frame_marks(chart, record, abscissa, quantities.front().member, unit);
     return chart;
 }
 
@@ -97,8 +93,7 @@ Chart chart_of(const Record& record, const Abscissa& abscissa, const std::string
 void add_cracks(Chart& chart, const Record& record, const Abscissa& abscissa, std::vector<double> CrackHistory::*member,
                 double factor) {
     const char* const inks[] = {colour::blue, colour::green, colour::orange, colour::purple};
-    if (!record.cracks.empty())
-        chart.series.front().label = "tracked crack";
+    if (!record.cracks.empty()) chart.series.front().label = "tracked crack";
     for (std::size_t i = 0; i < record.cracks.size(); ++i)
         chart.series.push_back({.label = fmt::format("crack{}", i + 1),
                                 .colour = inks[i % std::size(inks)],
@@ -125,8 +120,7 @@ std::vector<std::string> curves(const Record& record, const Abscissa& abscissa) 
 
 /// What carries the crack on from each place of its way, which in equilibrium is known.
 std::vector<std::string> driving_figures(const Record& record) {
-    if (record.driving.empty())
-        return {};
+    if (record.driving.empty()) return {};
     std::vector<double> length, displacement, G, toughness;
     for (const CriticalLoad& load : record.driving) {
         length.push_back(1e3 * load.crack_length);
@@ -149,14 +143,11 @@ std::vector<std::string> driving_figures(const Record& record) {
 }
 
 std::string curves_section(const Record& record) {
-    if (record.series.empty())
-        return section("Curves", paragraph("The record holds no saved instant."));
+    if (record.series.empty()) return section("Curves", paragraph("The record holds no saved instant."));
     const bool moves = std::ranges::any_of(record.series, [](const Instant& instant) { return instant.displacement != 0; });
     std::string markup;
-    if (moves)
-        markup += figures(curves(record, over_displacement(record)));
-    if (!moves || !is_steady(record))
-        markup += figures(curves(record, over_time(record)));
+    if (moves) markup += figures(curves(record, over_displacement(record)));
+    if (!moves || !is_steady(record)) markup += figures(curves(record, over_time(record)));
     else if (const Instant& end = record.series.back(); end.time > 0)
         markup += paragraph(fmt::format("The loading is steady, at {:.4g} mm/s: displacement tells the time.",
                                         1e3 * end.displacement / end.time));

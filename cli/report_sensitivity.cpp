@@ -58,11 +58,9 @@ std::string indices_section(const Sensitivity& sensitivity) {
 
 std::string runs_section(const Sensitivity& sensitivity) {
     std::map<std::string, int> ends;
-    for (const SensitivityRun& run : sensitivity.runs)
-        ++ends[run.status];
+    for (const SensitivityRun& run : sensitivity.runs) ++ends[run.status];
     std::vector<std::vector<std::string>> rows;
-    for (const auto& [status, count] : ends)
-        rows.push_back({status, std::to_string(count)});
+    for (const auto& [status, count] : ends) rows.push_back({status, std::to_string(count)});
     return section("Runs", table("How the runs ended", {"Status", "Runs"}, rows));
 }
 

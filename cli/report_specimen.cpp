@@ -27,8 +27,7 @@ struct View {
 
     /// A point's rectangle of this size; one that is nowhere is left out.
     void include(const Vec2& point, const Vec2& size) {
-        if (!point.allFinite())
-            return;
+        if (!point.allFinite()) return;
         low = low.cwiseMin(point - 0.5 * size);
         high = high.cwiseMax(point + 0.5 * size);
     }
@@ -47,15 +46,13 @@ struct View {
 /// 0 where no two stand in a row.
 double spacing(const std::vector<Vec2>& points, int along) {
     std::vector<std::pair<long, double>> ordered;
-    for (const Vec2& point : points)
-        ordered.emplace_back(std::lround(1e9 * point[1 - along]), point[along]);
+    for (const Vec2& point : points) ordered.emplace_back(std::lround(1e9 * point[1 - along]), point[along]);
     std::ranges::sort(ordered);
     std::vector<double> steps;
     for (std::size_t i = 1; i < ordered.size(); ++i)
         if (ordered[i].first == ordered[i - 1].first && ordered[i].second > ordered[i - 1].second)
             steps.push_back(ordered[i].second - ordered[i - 1].second);
-    if (steps.empty())
-        return 0;
+    if (steps.empty()) return 0;
     const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
     std::ranges::nth_element(steps, middle);
     return *middle;
@@ -63,8 +60,7 @@ double spacing(const std::vector<Vec2>& points, int along) {
 
 Vec2 spacing(const std::vector<Vec2>& points) {
     Vec2 both(spacing(points, 0), spacing(points, 1));
-    if (!(both.maxCoeff() > 0))
-        both.setConstant(1e-3);
+    if (!(both.maxCoeff() > 0)) both.setConstant(1e-3);
     return (both.array() > 0).select(both, both.maxCoeff());
 }
 
@@ -72,15 +68,13 @@ Vec2 spacing(const std::vector<Vec2>& points) {
 std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std::vector<Colour>& colours, const Vec2& spacing_of,
                                       const View& view, int longer_side = picture_pixels) {
     const Vec2 size = view.high - view.low;
-    if (!size.allFinite())
-        return {};
+    if (!size.allFinite()) return {};
     const double scale = longer_side / size.maxCoeff();  // [px/m]
     cv::Mat picture(std::max(1, static_cast<int>(std::lround(size.y() * scale))),
                     std::max(1, static_cast<int>(std::lround(size.x() * scale))), CV_8UC3, cv::Scalar::all(255));
     const cv::Rect whole(0, 0, picture.cols, picture.rows);
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (!view.contains(points[i]))
-            continue;
+        if (!view.contains(points[i])) continue;
         // Outward to whole pixels, and a little overlap: what is stretched shows no seams.
         const Vec2 low = (points[i] - 0.53 * spacing_of - view.low) * scale,
                    high = (points[i] + 0.53 * spacing_of - view.low) * scale;
@@ -97,8 +91,7 @@ std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std
 
 Colour between(const Colour& a, const Colour& b, double part) {
     Colour mixed;
-    for (int i = 0; i < 3; ++i)
-        mixed[i] = static_cast<std::uint8_t>(std::lround(std::lerp(a[i], b[i], part)));
+    for (int i = 0; i < 3; ++i) mixed[i] = static_cast<std::uint8_t>(std::lround(std::lerp(a[i], b[i], part)));
     return mixed;
 }
 
@@ -111,8 +104,7 @@ Colour wood_colour(double latewood) {
 
 std::vector<Colour> stress_scale() {
     cv::Mat steps(1, stress_steps, CV_8U), colours;
-    for (int i = 0; i < stress_steps; ++i)
-        steps.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(255 * i / (stress_steps - 1));
+    for (int i = 0; i < stress_steps; ++i) steps.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(255 * i / (stress_steps - 1));
     cv::applyColorMap(steps, colours, cv::COLORMAP_CIVIDIS);
     return {colours.begin<Colour>(), colours.end<Colour>()};
 }
@@ -161,8 +153,7 @@ std::string map_figure(const Record& record, const std::vector<std::size_t>& fra
     chart.last_frame = static_cast<int>(frames.size()) - 1;
     if (two_woods) {
         std::vector<Colour> wood;
-        for (int i = 0; i < stress_steps; ++i)
-            wood.push_back(wood_colour(static_cast<double>(i) / (stress_steps - 1)));
+        for (int i = 0; i < stress_steps; ++i) wood.push_back(wood_colour(static_cast<double>(i) / (stress_steps - 1)));
         chart.legend_markup = colour_bar("Material", "first (earlywood)", "last (latewood)", wood);
     }
     return draw(chart);
@@ -175,16 +166,13 @@ double readable_magnification(const Record& record, const std::vector<std::size_
     double largest = 0;
     for (const std::size_t frame : frames)
         for (const Eigen::Vector2f& moved : record.frames[frame].moved)
-            if (moved.allFinite())
-                largest = std::max<double>(largest, moved.norm());
-    if (largest == 0 || largest > 0.01 * extent)
-        return 1;
+            if (moved.allFinite()) largest = std::max<double>(largest, moved.norm());
+    if (largest == 0 || largest > 0.01 * extent) return 1;
     const double wanted = 0.05 * extent / largest;
     const double power = std::pow(10, std::floor(std::log10(wanted)));
     double magnification = power;
     for (const double step : {2.0, 5.0})
-        if (step * power <= wanted)
-            magnification = step * power;
+        if (step * power <= wanted) magnification = step * power;
     return magnification;
 }
 
@@ -201,8 +189,7 @@ std::pair<double, double> stress_range(const std::vector<std::vector<double>>& s
     std::vector<double> all;
     for (const std::vector<double>& frame : stresses)
         std::ranges::copy_if(frame, std::back_inserter(all), [](double value) { return std::isfinite(value); });
-    if (all.empty())
-        return {0, 0};
+    if (all.empty()) return {0, 0};
     const auto quantile = [&](double part) {
         const auto at = all.begin() + std::lround(part * static_cast<double>(all.size() - 1));
         std::ranges::nth_element(all, at);
@@ -213,8 +200,7 @@ std::pair<double, double> stress_range(const std::vector<std::vector<double>>& s
 
 std::vector<Vec2> deformed(const Record& record, const Frame& frame, double magnification) {
     std::vector<Vec2> places = record.point_position;
-    for (std::size_t i = 0; i < places.size(); ++i)
-        places[i] += magnification * frame.moved[i].cast<double>();
+    for (std::size_t i = 0; i < places.size(); ++i) places[i] += magnification * frame.moved[i].cast<double>();
     return places;
 }
 
@@ -237,15 +223,13 @@ std::vector<std::vector<std::uint8_t>> draw_frames(const std::vector<std::vector
         std::size_t bytes = 0;
         for (std::size_t i = 0; i < places.size(); ++i)
             bytes += pictures.emplace_back(draw_points(places[i], colours[i], spacing_of, view, pixels)).size();
-        if (bytes <= most_picture_bytes)
-            return pictures;
+        if (bytes <= most_picture_bytes) return pictures;
     }
 }
 
 std::string deformed_figure(const Record& record, const std::vector<std::size_t>& frames, const Vec2& spacing_of) {
     View body;
-    for (const Vec2& point : record.point_position)
-        body.include(point, spacing_of);
+    for (const Vec2& point : record.point_position) body.include(point, spacing_of);
     View view = body;
     const double magnification = readable_magnification(record, frames, (body.high - body.low).maxCoeff());
     std::vector<std::vector<Vec2>> places;
@@ -253,15 +237,13 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
     for (const std::size_t frame : frames) {
         places.push_back(deformed(record, record.frames[frame], magnification));
         stresses.push_back(principal_stress(record.frames[frame]));
-        for (const Vec2& place : places.back())
-            view.include(place, spacing_of);
+        for (const Vec2& place : places.back()) view.include(place, spacing_of);
     }
     view.keep_near(body);
     const auto [low, high] = stress_range(stresses);
     const std::vector<Colour> scale = stress_scale();
     std::vector<std::vector<Colour>> colours;
-    for (const std::vector<double>& frame : stresses)
-        colours.push_back(stress_colours(frame, low, high, scale));
+    for (const std::vector<double>& frame : stresses) colours.push_back(stress_colours(frame, low, high, scale));
     const std::vector<std::vector<std::uint8_t>> pictures = draw_frames(places, colours, spacing_of, view);
     Chart chart = plane_chart(magnification == 1 ? "Deformed specimen, displacements as they are"
                                                  : fmt::format("Deformed specimen, displacements {:g} times", magnification));
@@ -299,8 +281,7 @@ std::string slider(const Record& record, const std::vector<std::size_t>& frames)
 }  // namespace
 
 std::vector<std::size_t> shown_frames(const Record& record) {
-    if (record.point_position.empty())
-        return {};
+    if (record.point_position.empty()) return {};
     const std::size_t count = std::min(record.frames.size(), most_frames);
     std::vector<std::size_t> frames;
     for (std::size_t i = 0; i < count; ++i)
@@ -322,8 +303,7 @@ std::string specimen_section(const Record& record) {
     const Vec2 spacing_of = spacing(record.point_position);
     std::vector<std::string> drawings{map_figure(record, frames, spacing_of)};
     std::string markup;
-    if (frames.empty())
-        markup = paragraph("The record holds no frames; \"frames\" under [output] of the scene asks for them.");
+    if (frames.empty()) markup = paragraph("The record holds no frames; \"frames\" under [output] of the scene asks for them.");
     else {
         drawings.push_back(deformed_figure(record, frames, spacing_of));
         markup = slider(record, frames);

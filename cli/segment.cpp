@@ -30,7 +30,8 @@ struct Arguments {
 /// Edge of a pixel from two places of the picture and their distance, as in "120,80 1320,85 = 25 mm" [m].
 double pixel_by_two_points(const std::string& text) {
     const auto fail = [&]() -> double {
-        throw InputError("command line", "--scale", text, "must be two places in pixels and their distance, as in \"120,80 1320,85 = 25 mm\"");
+        throw InputError("command line", "--scale", text,
+                         "must be two places in pixels and their distance, as in \"120,80 1320,85 = 25 mm\"");
     };
     const std::size_t equals = text.find('=');
     double x[4];
@@ -78,28 +79,23 @@ SegmentOptions options_of(const Arguments& arguments) {
     }
     if (!arguments.pixel.empty()) {
         options.pixel = parse_quantity(arguments.pixel, dimension::length, {"command line", "--pixel"});
-        if (!(options.pixel > 0))
-            throw InputError("command line", "--pixel", arguments.pixel, "must be greater than 0");
+        if (!(options.pixel > 0)) throw InputError("command line", "--pixel", arguments.pixel, "must be greater than 0");
     }
     if (!arguments.scale.empty()) {
         options.pixel = pixel_by_two_points(arguments.scale);
         options.pixel_from = "two points";
     }
-    for (const std::string& range : arguments.gray)
-        options.gray.push_back(gray_class(range));
-    if (!arguments.density.empty())
-        options.density = read_density_table(arguments.density);
+    for (const std::string& range : arguments.gray) options.gray.push_back(gray_class(range));
+    if (!arguments.density.empty()) options.density = read_density_table(arguments.density);
     options.direction = arguments.direction;
     options.fit_pith = arguments.pith == "fit";
-    if (!arguments.pith.empty() && !options.fit_pith)
-        options.pith = place_of(arguments.pith);
-    if (!arguments.borders.empty())
-        options.borders = read_borders(arguments.borders);
+    if (!arguments.pith.empty() && !options.fit_pith) options.pith = place_of(arguments.pith);
+    if (!arguments.borders.empty()) options.borders = read_borders(arguments.borders);
     return options;
 }
 
-/// Maps of the whole picture come and go. Memory that went back to the system each time would come back page by page, which took a quarter of
-/// the time.
+/// Maps of the whole picture come and go. Memory that went back to the system each time would come back page by page, which took
+/// a quarter of the time.
 void keep_memory() {
     mallopt(M_MMAP_MAX, 0);
     mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
@@ -117,11 +113,9 @@ ExitStatus segment_and_save(const Arguments& arguments, const CommonOptions& com
     SegmentOptions options = options_of(arguments);
     options.threads = common.threads;
     const Segmentation result = segment(arguments.image, options);
-    for (const std::string& note : result.notes)
-        report(common, note);
+    for (const std::string& note : result.notes) report(common, note);
     write(result.specimen, arguments.output);
-    if (!arguments.preview.empty())
-        write_preview(arguments.image, result.specimen, arguments.preview);
+    if (!arguments.preview.empty()) write_preview(arguments.image, result.specimen, arguments.preview);
     report(common, "saved as " + arguments.output.string());
     return ExitStatus::done;
 }
@@ -138,12 +132,14 @@ Verb segment_verb(CLI::App& command, const CommonOptions& common) {
     verb->add_option("--scale", arguments->scale, "Two places in pixels and their distance, as in \"120,80 1320,85 = 25 mm\"")
         ->type_name("X,Y X,Y = LENGTH")
         ->excludes("--pixel");
-    auto* ranges = verb->add_option("--gray", arguments->gray, "A class by its grays, as in \"EW 128-255\"; once for each, grays in none are void")
-        ->type_name("CLASS LOW-HIGH")
+    auto* ranges = verb->add_option("--gray", arguments->gray,
+                                    "A class by its grays, as in \"EW 128-255\"; once for each, grays in none are void")
+                       ->type_name("CLASS LOW-HIGH")
                        ->allow_extra_args(false);
     verb->add_option("--density", arguments->density, "Table gray,density [kg/m^3]: the specimen gets a map of its density")
         ->type_name("CAL.csv");
-    verb->add_option("--direction", arguments->direction, "Second picture, as large, to see the radial direction in")->type_name("IMAGE");
+    verb->add_option("--direction", arguments->direction, "Second picture, as large, to see the radial direction in")
+        ->type_name("IMAGE");
     verb->add_option("--pith", arguments->pith,
                      "Radial directions away from here, as in \"-300,150\" pixels, or \"fit\": from where they fit best")
         ->type_name("fit|X,Y");

@@ -14,8 +14,7 @@ std::atomic<bool> requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch nothing else");
 
 extern "C" void on_signal(int) {
-    if (requested.exchange(true))
-        ::_exit(static_cast<int>(ExitStatus::interrupted));
+    if (requested.exchange(true)) ::_exit(static_cast<int>(ExitStatus::interrupted));
     constexpr std::string_view answer = "\ncrampfit: stopping to save what there is; once more ends at once\n";
     // Nothing can be done where even this cannot be written.
     [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, answer.data(), answer.size());

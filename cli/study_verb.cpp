@@ -23,8 +23,7 @@ Study open_study(const std::filesystem::path& file, const CommonOptions& common)
 }
 
 void RunsLine::show(int runs, int most, const std::string& failure, const std::string& details) {
-    if (!failure.empty())
-        report(common_, failure);
+    if (!failure.empty()) report(common_, failure);
     line_.show(std::min(1.0, static_cast<double>(runs) / std::max(1, most)), runs, details);
 }
 

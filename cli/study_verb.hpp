@@ -40,7 +40,8 @@ class RunsLine {
 };
 
 /// Options of the fit or the sensitivity study, all but their progress.
-template <class Options> Options study_options(const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
+template <class Options>
+Options study_options(const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
     Options options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();

@@ -24,7 +24,8 @@ struct Arguments {
     std::string from = "auto";  // auto, fields or gray
 };
 
-constexpr double well_known = 0.2;  // of a subset: a tip whose place displacements tell no better is looked for as a dark line, too
+// Of a subset: a tip whose place displacements tell no better is looked for as a dark line, too.
+constexpr double well_known = 0.2;
 
 /// The tip by the displacement field, by the picture's gray, or by the gray where the field does not show it well.
 class TipFinder {
@@ -33,19 +34,17 @@ class TipFinder {
         : correlator_(make_correlator(pictures, common)), by_fields_(from != "gray") {
         const FinePicture reference = read_reference(pictures);
         geometry_ = {correlator_.lattice(), pictures.options.subset, reference.columns, reference.rows};
-        if (from != "fields")
-            gray_.emplace(reference, read_mask(pictures.mask, reference));
+        if (from != "fields") gray_.emplace(reference, read_mask(pictures.mask, reference));
     }
 
     CrackTip operator()(const FinePicture& image) {
         CrackTip tip;
-        if (by_fields_)
-            tip = find_crack_tip(geometry_, correlator_.field(image));
+        if (by_fields_) tip = find_crack_tip(geometry_, correlator_.field(image));
         const bool found = tip.status == TipStatus::ok;
-        if (!gray_ || (found && tip.sigma < well_known * geometry_.subset))
-            return tip;
+        if (!gray_ || (found && tip.sigma < well_known * geometry_.subset)) return tip;
         const CrackTip by_gray = gray_->tip(image);
-        const bool seen = (by_gray.status == TipStatus::ok && !(found && tip.sigma < by_gray.sigma)) || by_gray.status == TipStatus::outside;
+        const bool seen =
+            (by_gray.status == TipStatus::ok && !(found && tip.sigma < by_gray.sigma)) || by_gray.status == TipStatus::outside;
         from_gray_ += seen;
         return seen || !by_fields_ || tip.status == TipStatus::too_few_points ? by_gray : tip;
     }
@@ -100,11 +99,12 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
     const int done = static_cast<int>(track.tips.size());
     keep_first(track, track.tips.size());
     write(track, pictures.output);
-    if (!pictures.preview.empty() && done > 0)
-        draw_track(read_image(pictures, done - 1), track.tips, pictures.preview);
-    report(common, fmt::format("tip found in {} of {} images{}, saved as {}", std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status),
-                               done, find_tip.from_gray() > 0 ? fmt::format(", {} by the dark line that the crack is", find_tip.from_gray()) : "",
-                               pictures.output.string()));
+    if (!pictures.preview.empty() && done > 0) draw_track(read_image(pictures, done - 1), track.tips, pictures.preview);
+    report(common,
+           fmt::format(
+               "tip found in {} of {} images{}, saved as {}", std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status),
+               done, find_tip.from_gray() > 0 ? fmt::format(", {} by the dark line that the crack is", find_tip.from_gray()) : "",
+               pictures.output.string()));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 
@@ -116,7 +116,8 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
     add_picture_times(*verb, arguments->times);
     verb->add_option("--from", arguments->from,
-                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements do not show the tip well")
+                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements "
+                     "do not show the tip well")
         ->check(CLI::IsMember({"auto", "fields", "gray"}))
         ->capture_default_str();
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};

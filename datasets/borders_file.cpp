@@ -21,8 +21,7 @@ const std::array<std::string, 3> column_names{"ring", "x_px", "y_px"};
 std::vector<std::string> fields_of(const std::string& line) {
     std::vector<std::string> fields;
     std::istringstream in(line + ',');
-    for (std::string field; std::getline(in, field, ',');)
-        fields.push_back(trim(field));
+    for (std::string field; std::getline(in, field, ',');) fields.push_back(trim(field));
     return fields;
 }
 
@@ -32,8 +31,7 @@ std::array<std::size_t, 3> read_head(const std::string& line, const std::string&
     std::array<std::size_t, 3> place{};
     for (std::size_t i = 0; i < 3; ++i) {
         place[i] = std::find(fields.begin(), fields.end(), column_names[i]) - fields.begin();
-        if (place[i] == fields.size())
-            throw InputError(file, "head", line, "must name the columns ring, x_px and y_px");
+        if (place[i] == fields.size()) throw InputError(file, "head", line, "must name the columns ring, x_px and y_px");
     }
     return place;
 }
@@ -59,8 +57,7 @@ std::vector<BorderPolyline> read_borders(const std::filesystem::path& file) {
     std::string line;
     for (std::size_t number = 1; std::getline(text, line); ++number) {
         line = trim(line);
-        if (line.empty() || line.front() == '#')
-            continue;
+        if (line.empty() || line.front() == '#') continue;
         if (!head) {
             place = read_head(line, file.string());
             head = true;

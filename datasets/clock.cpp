@@ -11,7 +11,7 @@
 namespace crampfit {
 namespace {
 
-constexpr int least_images = 3;      // on the load's record, to set a clock by
+constexpr int least_images = 3;  // on the load's record, to set a clock by
 constexpr int offsets_tried = 2000;
 constexpr int most_steps = 50;
 
@@ -28,18 +28,17 @@ class SharedChannel {
     }
 
     struct Comparison {
-        std::vector<double> time, off, slope;  // of the images on the load's record: on their clock [s]; image less load; of the load [1/s]
+        std::vector<double> time, off,
+            slope;  // of the images on the load's record: on their clock [s]; image less load; of the load [1/s]
 
         double mean_square() const {
             double sum = 0;
-            for (const double value : off)
-                sum += value * value;
+            for (const double value : off) sum += value * value;
             return off.empty() ? INFINITY : sum / static_cast<double>(off.size());
         }
         double mean_slope() const {
             double sum = 0;
-            for (const double value : slope)
-                sum += value * value;
+            for (const double value : slope) sum += value * value;
             return slope.empty() ? 0 : std::sqrt(sum / static_cast<double>(slope.size()));
         }
     };
@@ -49,8 +48,7 @@ class SharedChannel {
         for (std::size_t i = 0; i < times_.size(); ++i) {
             const double at = offset + rate * times_[i];
             const double off = values_[i] - load_at(load_times_, load_, at);
-            if (std::isnan(off))
-                continue;
+            if (std::isnan(off)) continue;
             const double from = std::max(load_times_.front(), at - reach_), to = std::min(load_times_.back(), at + reach_);
             result.time.push_back(times_[i]);
             result.off.push_back(off);
@@ -66,7 +64,8 @@ class SharedChannel {
         for (int i = 0; i <= offsets_tried; ++i) {
             const double offset = std::lerp(first, last, static_cast<double>(i) / offsets_tried);
             const Comparison here = compare(offset, rate);
-            if (2 * here.off.size() < times_.size() || static_cast<int>(here.off.size()) < least_images || !(here.mean_square() < least))
+            if (2 * here.off.size() < times_.size() || static_cast<int>(here.off.size()) < least_images ||
+                !(here.mean_square() < least))
                 continue;
             least = here.mean_square();
             best = offset;
@@ -85,14 +84,13 @@ class SharedChannel {
                 normal += row * row.transpose();
                 right += row * here.off[i];
             }
-            if (!rate_is_free)
-                normal(1, 1) = 1;
+            if (!rate_is_free) normal(1, 1) = 1;
             Eigen::Vector2d change = normal.ldlt().solve(right);
             double share = 1;
-            while (share > 1e-3 && !(compare(offset + share * change[0], rate + share * change[1]).mean_square() < here.mean_square()))
+            while (share > 1e-3 &&
+                   !(compare(offset + share * change[0], rate + share * change[1]).mean_square() < here.mean_square()))
                 share *= 0.5;
-            if (share <= 1e-3 || !change.allFinite())
-                return;
+            if (share <= 1e-3 || !change.allFinite()) return;
             offset += share * change[0];
             rate += share * change[1];
         }
@@ -106,12 +104,10 @@ class SharedChannel {
 }  // namespace
 
 double load_at(const std::vector<double>& times, const std::vector<double>& values, double time) {
-    if (!(time >= times.front() && time <= times.back()))
-        return CrackTip::unknown;
+    if (!(time >= times.front() && time <= times.back())) return CrackTip::unknown;
     const auto after = std::ranges::lower_bound(times, time);
     const auto i = static_cast<std::size_t>(after - times.begin());
-    if (*after == time)
-        return values[i];
+    if (*after == time) return values[i];
     return std::lerp(values[i - 1], values[i], (time - times[i - 1]) / (times[i] - times[i - 1]));
 }
 
@@ -126,8 +122,7 @@ ClockSetting set_clock(const Curves& images, const Curves& load, const ClockChoi
         clock.reason = told.rate ? "the same start; rate as told" : "taken for the same";
     }
     for (const auto& [name, column] : {std::pair{"displacement", &Curves::displacement}, {"force", &Curves::force}}) {
-        if (!measured(images.*column) || !measured(load.*column))
-            continue;
+        if (!measured(images.*column) || !measured(load.*column)) continue;
         const SharedChannel channel(images, load, column);
         if (!given) {
             clock.offset = channel.scan(clock.rate);
@@ -137,7 +132,8 @@ ClockSetting set_clock(const Curves& images, const Curves& load, const ClockChoi
         const SharedChannel::Comparison left = channel.compare(clock.offset, clock.rate);
         if (static_cast<int>(left.off.size()) < least_images || !(left.mean_slope() > 0))
             throw InputError(file.string(), name, fmt::format("{} images on the load's record", left.off.size()),
-                             fmt::format("to set the clock by, {} images at least must lie on it, and the {} must change", least_images, name));
+                             fmt::format("to set the clock by, {} images at least must lie on it, and the {} must change",
+                                         least_images, name));
         clock.misalignment = std::sqrt(left.mean_square()) / left.mean_slope();
         break;
     }

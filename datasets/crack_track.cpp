@@ -15,8 +15,8 @@ using hdf5::Group;
 
 namespace {
 
-constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack",
-                                                                 "tip outside the picture", "not lined up with the reference"};
+constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack", "tip outside the picture",
+                                                                 "not lined up with the reference"};
 
 struct TipColumn {
     const char* name;
@@ -50,7 +50,8 @@ void write_ways(Group& root, const std::vector<CrackTip>& tips) {
         points.insert(points.end(), tip.way.begin(), tip.way.end());
         ends.push_back(static_cast<std::int64_t>(points.size()));
     }
-    root.write("way points", points, {"px", "of the cracks' ways from mouth to tip, where they were followed, one image after the other"});
+    root.write("way points", points,
+               {"px", "of the cracks' ways from mouth to tip, where they were followed, one image after the other"});
     root.write("way ends", ends, {"1", "row of `way points` before which each image's way ends"});
 }
 
@@ -76,21 +77,17 @@ Curves curves_of(const CrackTrack& track) {
     curves.displacement = track.displacement;
     curves.force = track.force;
     for (const CrackTip& tip : track.tips)
-        if (track.pixel)
-            curves.crack_length.push_back(tip.length * *track.pixel);
+        if (track.pixel) curves.crack_length.push_back(tip.length * *track.pixel);
     return curves;
 }
 
 std::vector<Vec2> path_of(const CrackTrack& track) {
     for (auto tip = track.tips.rbegin(); tip != track.tips.rend(); ++tip)
-        if (!tip->way.empty())
-            return tip->way;
+        if (!tip->way.empty()) return tip->way;
     std::vector<Vec2> path;
     for (const CrackTip& tip : track.tips) {
-        if (tip.status != TipStatus::ok)
-            continue;
-        if (path.empty())
-            path.push_back(tip.tip - tip.length * Vec2(std::cos(tip.angle), std::sin(tip.angle)));
+        if (tip.status != TipStatus::ok) continue;
+        if (path.empty()) path.push_back(tip.tip - tip.length * Vec2(std::cos(tip.angle), std::sin(tip.angle)));
         path.push_back(tip.tip);
     }
     return path;
@@ -100,8 +97,7 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
     hdf5::save(file, "track", [&](Group& root) {
         root.write_text("reference", track.reference, "picture that all others are compared with");
         root.write_texts("image files", track.images, "pictures by their number");
-        if (track.pixel)
-            root.write("pixel", *track.pixel, {"m", "edge of a pixel"});
+        if (track.pixel) root.write("pixel", *track.pixel, {"m", "edge of a pixel"});
         root.write_texts("status names", {status_names.begin(), status_names.end()}, "whether a tip was found");
         if (track.rows > 0) {
             root.write<std::int64_t>("columns", track.columns, {"px", "width of the pictures"});
@@ -114,13 +110,11 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
             tips.push_back(tip.tip);
         }
         root.write("status", status, {"1", "index into `status names`; 0 is a tip that was found"});
-        root.write(
-            "tip", tips,
-            {"px", "x right, y down, from the centre of the first pixel, at the material's place in the reference"});
+        root.write("tip", tips,
+                   {"px", "x right, y down, from the centre of the first pixel, at the material's place in the reference"});
         for (const TipColumn& column : tip_columns) {
             std::vector<double> values;
-            for (const CrackTip& tip : track.tips)
-                values.push_back(tip.*column.value);
+            for (const CrackTip& tip : track.tips) values.push_back(tip.*column.value);
             root.write(column.name, values, column.meaning);
         }
         write_ways(root, track.tips);
@@ -133,8 +127,7 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
                 clock.write("misalignment", *track.clock->misalignment, {"s", "that is left between the clocks, one sigma"});
         }
         for (const LoadColumn& column : load_columns)
-            if (!(track.*column.values).empty())
-                root.write(column.name, track.*column.values, column.meaning);
+            if (!(track.*column.values).empty()) root.write(column.name, track.*column.values, column.meaning);
     });
 }
 
@@ -143,8 +136,7 @@ CrackTrack read_crack_track(const std::filesystem::path& file) {
     CrackTrack track;
     track.reference = root.read_text("reference");
     track.images = root.read_texts("image files");
-    if (root.has("pixel"))
-        track.pixel = root.read_number<double>("pixel");
+    if (root.has("pixel")) track.pixel = root.read_number<double>("pixel");
     if (root.has("rows")) {
         track.columns = static_cast<int>(root.read_number<std::int64_t>("columns"));
         track.rows = static_cast<int>(root.read_number<std::int64_t>("rows"));
@@ -161,20 +153,17 @@ CrackTrack read_crack_track(const std::filesystem::path& file) {
     }
     for (const TipColumn& column : tip_columns) {
         const std::vector<double> values = root.read_column<double>(column.name, count);
-        for (std::size_t i = 0; i < count; ++i)
-            track.tips[i].*column.value = values[i];
+        for (std::size_t i = 0; i < count; ++i) track.tips[i].*column.value = values[i];
     }
-    if (root.has("way ends"))
-        read_ways(root, track.tips);
+    if (root.has("way ends")) read_ways(root, track.tips);
     if (root.has("clock")) {
         const Group clock = root.group("clock");
-        track.clock = ClockSetting{clock.read_number<double>("offset"), clock.read_number<double>("rate"), clock.read_text("reason"), {}};
-        if (clock.has("misalignment"))
-            track.clock->misalignment = clock.read_number<double>("misalignment");
+        track.clock =
+            ClockSetting{clock.read_number<double>("offset"), clock.read_number<double>("rate"), clock.read_text("reason"), {}};
+        if (clock.has("misalignment")) track.clock->misalignment = clock.read_number<double>("misalignment");
     }
     for (const LoadColumn& column : load_columns)
-        if (root.has(column.name))
-            track.*column.values = root.read_column<double>(column.name, count);
+        if (root.has(column.name)) track.*column.values = root.read_column<double>(column.name, count);
     return track;
 }
 

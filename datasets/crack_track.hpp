@@ -35,7 +35,8 @@ struct CrackTip {
     double angle = unknown;      // in which the crack points, clockwise as seen, from +x [rad]
     double length = unknown;     // from where the crack's line enters the picture to the tip [px]
     double sigma = unknown;      // standard error of the length [px]
-    std::vector<Vec2> way = {};  // of the crack from its mouth to the tip, or through the picture, where it was followed; else it is straight [px]
+    // Of the crack from its mouth to the tip, or through the picture, where it was followed; else it is straight [px].
+    std::vector<Vec2> way = {};
 };
 
 /// How the images' clock was set by the load's: load time = offset + rate * image time.
@@ -50,20 +51,20 @@ struct ClockSetting {
 struct CrackTrack {
     std::string reference;
     std::vector<std::string> images;
-    std::optional<double> pixel;       // edge of a pixel, where it was told [m]
-    int columns = 0, rows = 0;         // of the pictures [px]; 0: not known
-    std::vector<CrackTip> tips;        // of each image
-    std::vector<double> time;          // of each image on the load's clock, or empty [s]
-    std::vector<double> displacement;  // of the loading then, or empty [m]; not a number outside the load's record
-    std::vector<double> force;         // of the loading then, or empty [N]; likewise
-    std::optional<ClockSetting> clock; // where a load was given
+    std::optional<double> pixel;        // edge of a pixel, where it was told [m]
+    int columns = 0, rows = 0;          // of the pictures [px]; 0: not known
+    std::vector<CrackTip> tips;         // of each image
+    std::vector<double> time;           // of each image on the load's clock, or empty [s]
+    std::vector<double> displacement;   // of the loading then, or empty [m]; not a number outside the load's record
+    std::vector<double> force;          // of the loading then, or empty [N]; likewise
+    std::optional<ClockSetting> clock;  // where a load was given
 };
 
 /// What a fit takes as an experiment's data: time, displacement, force and crack length as far as they are known.
 Curves curves_of(const CrackTrack& track);
 
-/// The crack's path as far as the pictures show it [px]: its way in the last image where it was followed; where it never was, from its mouth
-/// through its tips in one image after the other.
+/// The crack's path as far as the pictures show it [px]: its way in the last image where it was followed; where it never was,
+/// from its mouth through its tips in one image after the other.
 std::vector<Vec2> path_of(const CrackTrack& track);
 
 void write(const CrackTrack& track, const std::filesystem::path& file);

@@ -68,12 +68,10 @@ std::vector<Column> read_head(std::string_view line, std::size_t number, const s
         const auto kind = std::find_if(column_kinds.begin(), column_kinds.end(),
                                        [&](const ColumnKind& candidate) { return candidate.name == header.name; });
         if (kind == column_kinds.end()) {
-            fail("unknown column; known are time, displacement, force and crack_length" +
-                 suggestion(header.name, known));
+            fail("unknown column; known are time, displacement, force and crack_length" + suggestion(header.name, known));
         }
         if (!(header.unit.dimension == kind->dimension)) {
-            fail(fmt::format("wrong dimension: got {}, expected {}", describe(header.unit.dimension),
-                             describe(kind->dimension)));
+            fail(fmt::format("wrong dimension: got {}, expected {}", describe(header.unit.dimension), describe(kind->dimension)));
         }
         for (const Column& other : columns) {
             if (other.kind == &*kind) {
@@ -150,9 +148,8 @@ void write_curves(const Curves& curves, const std::filesystem::path& file) {
     for (const ColumnKind& kind : column_kinds) {
         if (const std::vector<double>& values = curves.*kind.values; !values.empty()) {
             if (!columns.empty() && values.size() != rows) {
-                throw InputError(
-                    file.string(), kind.name, fmt::format("{} rows", values.size()),
-                    fmt::format("all columns need the same number of rows; {} has {}", columns[0]->name, rows));
+                throw InputError(file.string(), kind.name, fmt::format("{} rows", values.size()),
+                                 fmt::format("all columns need the same number of rows; {} has {}", columns[0]->name, rows));
             }
             columns.push_back(&kind);
             rows = values.size();

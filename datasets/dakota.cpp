@@ -122,7 +122,8 @@ DakotaRequest read_dakota_request(const std::filesystem::path& file) {
         request.active.push_back(reader.number(function));
         request.labels.push_back(label_of(function.tag));
         if (request.active.back() > 7) {
-            throw InputError(reader.file(), function.tag, function.value, "must be 0 to 7: 1 for the value, 2 the gradient, 4 the Hessian");
+            throw InputError(reader.file(), function.tag, function.value,
+                             "must be 0 to 7: 1 for the value, 2 the gradient, 4 the Hessian");
         }
     }
     for (const Tagged& variable : reader.section("derivative_variables", "DAKOTA_DER_VARS")) {
@@ -141,8 +142,8 @@ DakotaRequest read_dakota_request(const std::filesystem::path& file) {
     return request;
 }
 
-void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values, const std::vector<std::vector<double>>& gradients,
-                          const std::filesystem::path& file) {
+void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values,
+                          const std::vector<std::vector<double>>& gradients, const std::filesystem::path& file) {
     std::string text;
     for (std::size_t k = 0; k < request.active.size(); ++k) {
         if (request.active[k] & DakotaRequest::value) {

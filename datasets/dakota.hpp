@@ -23,8 +23,8 @@ struct DakotaRequest {
 DakotaRequest read_dakota_request(const std::filesystem::path& file);
 
 /// What was asked for: values [functions], gradients [functions][derivative variables]. Written as a whole.
-void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values, const std::vector<std::vector<double>>& gradients,
-                          const std::filesystem::path& file);
+void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values,
+                          const std::vector<std::vector<double>>& gradients, const std::filesystem::path& file);
 
 /// Tells Dakota that the evaluation failed, for its failure capturing.
 void write_dakota_failure(const std::string& reason, const std::filesystem::path& file);

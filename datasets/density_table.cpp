@@ -32,8 +32,7 @@ double number_in(const std::string& text, const Place& place) {
 /// SI units in one of the density column's.
 double read_head(const std::string& line, const std::string& file) {
     const auto [gray, density] = halves_of(line, file);
-    if (gray != "gray")
-        throw InputError(file, "head", line, "must be gray,density [kg/m^3]");
+    if (gray != "gray") throw InputError(file, "head", line, "must be gray,density [kg/m^3]");
     const ColumnHeader header = parse_header(density, {file, "head"});
     if (header.name != "density" || !(header.unit.dimension == dimension::density))
         throw InputError(file, "head", line, "must be gray,density [kg/m^3], the density in any unit of density");
@@ -44,10 +43,8 @@ double read_head(const std::string& line, const std::string& file) {
 
 double DensityTable::at(double gray_value) const {
     const auto after = std::ranges::lower_bound(gray, gray_value);
-    if (after == gray.begin())
-        return density.front();
-    if (after == gray.end())
-        return density.back();
+    if (after == gray.begin()) return density.front();
+    if (after == gray.end()) return density.back();
     const auto i = static_cast<std::size_t>(after - gray.begin());
     return std::lerp(density[i - 1], density[i], (gray_value - gray[i - 1]) / (gray[i] - gray[i - 1]));
 }
@@ -60,8 +57,7 @@ DensityTable read_density_table(const std::filesystem::path& file) {
     std::string line;
     for (int number = 1; std::getline(text, line); ++number) {
         line = trim(line);
-        if (line.empty() || line.front() == '#')
-            continue;
+        if (line.empty() || line.front() == '#') continue;
         if (factor == 0) {
             factor = read_head(line, name);
             continue;
@@ -76,7 +72,8 @@ DensityTable read_density_table(const std::filesystem::path& file) {
             throw InputError(name, fmt::format("density, line {}", number), density, "must not be negative");
     }
     if (table.gray.size() < 2)
-        throw InputError(name, "", fmt::format("{} rows", table.gray.size()), "needs a head gray,density [kg/m^3] and two rows at least");
+        throw InputError(name, "", fmt::format("{} rows", table.gray.size()),
+                         "needs a head gray,density [kg/m^3] and two rows at least");
     return table;
 }
 

@@ -14,8 +14,8 @@ struct DensityTable {
     double at(double gray_value) const;
 };
 
-/// Reads a table with the columns gray and density [kg/m^3], in any unit of density. Throws InputError for anything else, for fewer than two
-/// rows, and for grays that do not rise from row to row.
+/// Reads a table with the columns gray and density [kg/m^3], in any unit of density. Throws InputError for anything else, for
+/// fewer than two rows, and for grays that do not rise from row to row.
 DensityTable read_density_table(const std::filesystem::path& file);
 
 }  // namespace crampfit

@@ -57,10 +57,10 @@ struct FieldSeries {
     std::string reference;            // file
     std::vector<std::string> images;  // files; an image's number is its place here, from 0
     PointLattice lattice;
-    int subset = 0;               // edge of a subset [px]
-    int order = 1;                // of the warp within a subset
-    std::optional<double> pixel;  // edge of a pixel, where it was told [m]
-    int columns = 0, rows = 0;    // of the pictures [px]; 0: not known
+    int subset = 0;                    // edge of a subset [px]
+    int order = 1;                     // of the warp within a subset
+    std::optional<double> pixel;       // edge of a pixel, where it was told [m]
+    int columns = 0, rows = 0;         // of the pictures [px]; 0: not known
     std::vector<double> time;          // of each image, or empty [s]
     std::vector<double> displacement;  // of the loading at each image, or empty [m]
 };

@@ -19,4 +19,4 @@ class InputError : public std::runtime_error {
     std::string rule;   // what must hold, as a sentence that a user can act on
 };
 
-} // namespace crampfit
+}  // namespace crampfit

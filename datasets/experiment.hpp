@@ -19,19 +19,19 @@ struct Curves {
 
 /// Standard deviation of the measurement, one sigma.
 struct Noise {
-    std::optional<double> force;         // [N]
-    std::optional<double> crack_length;  // [m]
-    std::optional<double> displacement;  // [m]
-    std::optional<double> time;          // [s]
+    std::optional<double> force;                    // [N]
+    std::optional<double> crack_length;             // [m]
+    std::optional<double> displacement;             // [m]
+    std::optional<double> time;                     // [s]
     std::optional<double> displacement_field = {};  // of each component, at each point [m]; absent: as the file has it
 };
 
-/// Displacement fields of a test's pictures against that of the unloaded specimen, in the specimen's coordinates. Each value is the
-/// mean over a subset of pixels, which counts as a square.
+/// Displacement fields of a test's pictures against that of the unloaded specimen, in the specimen's coordinates. Each value is
+/// the mean over a subset of pixels, which counts as a square.
 struct MeasuredFields {
     std::filesystem::path file;
-    std::vector<Vec2> places;                // [points] middles of the subsets, undeformed [m]
-    std::vector<double> instants;            // [pictures] rising: times [s], or displacements of the loading [m]
+    std::vector<Vec2> places;      // [points] middles of the subsets, undeformed [m]
+    std::vector<double> instants;  // [pictures] rising: times [s], or displacements of the loading [m]
     bool by_displacement = false;
     std::vector<std::vector<Vec2>> moved;    // [pictures][points] [m]; not a number where the point was lost
     std::vector<std::vector<double>> sigma;  // [pictures][points] standard error of each component [m]
@@ -52,7 +52,7 @@ struct Machine {
 struct Experiment {
     std::string name;
     Scene scene;
-    Curves data;                           // none of its columns, where fields are all there is
+    Curves data;  // none of its columns, where fields are all there is
     std::optional<MeasuredFields> fields = {};
     std::optional<Photograph> photograph = {};  // to look at: no fit rests on it
     Noise noise;
@@ -135,8 +135,8 @@ struct SensitivityChoice {
 /// `samples_a_subset` places in it, as correlation averages them, at each picture's instant.
 Probes probes_for(const MeasuredFields& fields);
 
-/// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives at its
-/// middle [samples_a_subset].
+/// How the displacements at these places make that of the subset: what fitting them with a polynomial of the warp's order gives
+/// at its middle [samples_a_subset].
 std::vector<double> subset_weights(int order);
 
 inline constexpr int samples_a_side = 5;
@@ -152,14 +152,14 @@ struct ModelChoice {
 struct Study {
     std::string title;
     std::vector<Experiment> experiments;
-    std::optional<Scene> scene;        // of a study without data; `experiments` is empty then
+    std::optional<Scene> scene;  // of a study without data; `experiments` is empty then
     std::vector<StudyOutput> outputs;
     std::vector<Parameter> parameters;
     OptimizerChoice optimizer;
     UncertaintyChoice uncertainty;
     SensitivityChoice sensitivity;
-    std::string compared_key;         // of the scenes
-    std::vector<ModelChoice> models;  // to be compared; empty where the scenes are taken as they are
+    std::string compared_key;          // of the scenes
+    std::vector<ModelChoice> models;   // to be compared; empty where the scenes are taken as they are
     std::optional<double> time_limit;  // of one run of one scene [s]; absent: none
     std::vector<std::pair<std::string, std::string>> scene_settings;  // --set for the scenes, as they were given
     std::filesystem::path file;
@@ -169,4 +169,4 @@ struct Study {
 /// The scenes that a study runs: the one that it stands on, or those of its experiments.
 std::vector<const Scene*> scenes_of(const Study& study);
 
-} // namespace crampfit
+}  // namespace crampfit

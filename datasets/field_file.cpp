@@ -75,10 +75,8 @@ void write_field(Group& images, int image, const PointLattice& lattice, const Di
     for (const FieldColumn& column : field_columns)
         group.write(column.name, field.*column.values, shape_of(lattice), column.meaning);
     std::vector<std::uint8_t> status;
-    for (const PointStatus one : field.status)
-        status.push_back(static_cast<std::uint8_t>(one));
-    group.write("status", status, shape_of(lattice),
-                {"1", "index into `status names`; 0 is a point that was followed"});
+    for (const PointStatus one : field.status) status.push_back(static_cast<std::uint8_t>(one));
+    group.write("status", status, shape_of(lattice), {"1", "index into `status names`; 0 is a point that was followed"});
 }
 
 DisplacementField read_field(const Group& group, const PointLattice& lattice) {
@@ -99,8 +97,7 @@ FieldSeries read_series(const Group& root) {
     series.reference = root.read_text("reference");
     series.subset = read_int(root, "subset", 1);
     series.order = read_int(root, "order", 1);
-    if (root.has("pixel"))
-        series.pixel = root.read_number<double>("pixel");
+    if (root.has("pixel")) series.pixel = root.read_number<double>("pixel");
     series.lattice = read_lattice(root.group("lattice"));
     series.images = root.read_texts("image files");
     if (root.has("picture columns")) {
@@ -108,8 +105,7 @@ FieldSeries read_series(const Group& root) {
         series.rows = read_int(root, "picture rows", 1);
     }
     for (const InstantColumn& column : instant_columns)
-        if (root.has(column.name))
-            series.*column.values = root.read_column<double>(column.name, series.images.size());
+        if (root.has(column.name)) series.*column.values = root.read_column<double>(column.name, series.images.size());
     return series;
 }
 
@@ -123,16 +119,14 @@ void write_fields(const FieldSeries& series, const std::function<std::optional<D
         root.write_text("reference", series.reference, "picture that all others are compared with");
         root.write<std::int64_t>("subset", series.subset, {"px", "edge of a subset"});
         root.write<std::int64_t>("order", series.order, {"1", "of the warp within a subset"});
-        if (series.pixel)
-            root.write("pixel", *series.pixel, {"m", "edge of a pixel"});
+        if (series.pixel) root.write("pixel", *series.pixel, {"m", "edge of a pixel"});
         root.write_texts("status names", {status_names.begin(), status_names.end()}, "what became of a point");
         write_lattice(root, series.lattice);
         Group images = root.make_group("images", "a group an image, by its number from 0");
         std::vector<std::string> written;
         for (int image = 0; image < static_cast<int>(series.images.size()); ++image) {
             const std::optional<DisplacementField> field = field_of(image);
-            if (!field)
-                break;
+            if (!field) break;
             write_field(images, image, series.lattice, *field);
             written.push_back(series.images[static_cast<std::size_t>(image)]);
         }

@@ -11,17 +11,17 @@ namespace crampfit {
 
 enum class FitStatus {
     converged,
-    run_limit,      // max_runs was used up
+    run_limit,  // max_runs was used up
     interrupted,
-    failed,         // no forward run ended
+    failed,  // no forward run ended
 };
 
 const char* name(FitStatus status);
 
 struct FittedParameter {
     std::string name;
-    std::string key;         // several joined by a space
-    double value = 0;        // in `unit`
+    std::string key;   // several joined by a space
+    double value = 0;  // in `unit`
     std::string unit;
     double standard_error = 0;
     double lower_95 = 0;
@@ -41,18 +41,18 @@ struct FitRun {
 /// One data point of one experiment against the model at the best parameters.
 struct FitResidual {
     std::string experiment;
-    std::string kind;       // "force", "arrival", or a component of a displacement field, "u_x" or "u_y"
-    double at = 0;          // displacement [m] or time [s] for force and fields; crack length [m] for arrival
-    double measured = 0;    // SI
-    double modelled = 0;    // SI
-    double sigma = 0;       // SI
-    double residual = 0;    // (modelled - measured) / sigma
+    std::string kind;     // "force", "arrival", or a component of a displacement field, "u_x" or "u_y"
+    double at = 0;        // displacement [m] or time [s] for force and fields; crack length [m] for arrival
+    double measured = 0;  // SI
+    double modelled = 0;  // SI
+    double sigma = 0;     // SI
+    double residual = 0;  // (modelled - measured) / sigma
 };
 
 /// Whether what is left of one measured curve looks like noise.
 struct FitCheck {
     std::string experiment;
-    std::string kind;              // as of its residuals
+    std::string kind;  // as of its residuals
     int points = 0;
     double chi_square = 0;         // sum of squared residuals
     double p_chi_square = 1;       // how often noise alone makes it as large
@@ -73,18 +73,18 @@ struct CurveDistance {
 /// One of the models that a study compares.
 struct ComparedModel {
     std::string name;
-    std::string status;           // of its fit
-    double misfit = 0;            // sum of squared weighted residuals; infinite when no run ended well
-    std::vector<double> values;   // of the parameters, in their units
-    double aic = 0;               // Akaike's information criterion; infinite when no run ended well
-    double bic = 0;               // Bayesian information criterion
-    double weight = 0;            // Akaike weight: of the evidence, all together 1
+    std::string status;          // of its fit
+    double misfit = 0;           // sum of squared weighted residuals; infinite when no run ended well
+    std::vector<double> values;  // of the parameters, in their units
+    double aic = 0;              // Akaike's information criterion; infinite when no run ended well
+    double bic = 0;              // Bayesian information criterion
+    double weight = 0;           // Akaike weight: of the evidence, all together 1
 };
 
 /// One point of a parameter's profile: the least misfit with that parameter held.
 struct ProfilePoint {
     std::string parameter;
-    double value = 0;   // of the parameter, in its unit
+    double value = 0;  // of the parameter, in its unit
     double misfit = 0;
 };
 
@@ -98,21 +98,21 @@ struct PosteriorSample {
 struct Fit {
     FitStatus status = FitStatus::converged;
     std::string message;
-    std::string method;                  // what did the work, and why it was chosen
+    std::string method;  // what did the work, and why it was chosen
     std::vector<FittedParameter> parameters;
-    Eigen::MatrixXd covariance;          // in the parameters' units
+    Eigen::MatrixXd covariance;  // in the parameters' units
     Eigen::MatrixXd correlation;
-    double misfit = 0;                   // sum of squared weighted residuals
+    double misfit = 0;  // sum of squared weighted residuals
     double reduced_chi_square = 0;
     std::vector<FitResidual> residuals;
-    std::vector<FitCheck> checks;        // of each curve
+    std::vector<FitCheck> checks;          // of each curve
     std::vector<CurveDistance> distances;  // of each curve
-    std::vector<ComparedModel> models;   // best first; empty where none were compared
-    std::vector<CrackPaths> crack_paths; // of each experiment; empty where they were not asked for
-    std::vector<ProfilePoint> profile;   // of each parameter, if asked for
+    std::vector<ComparedModel> models;     // best first; empty where none were compared
+    std::vector<CrackPaths> crack_paths;   // of each experiment; empty where they were not asked for
+    std::vector<ProfilePoint> profile;     // of each parameter, if asked for
     std::vector<PosteriorSample> posterior;
     std::vector<FitRun> runs;
-    double seconds = 0;                  // wall time [s]
+    double seconds = 0;  // wall time [s]
     unsigned seed = 0;
     std::string study_text;
 };
@@ -120,4 +120,4 @@ struct Fit {
 /// How far the photographed paths of all experiments together are from those of a model; the cracks are left out.
 SimulatedPath together(const Fit& fit, const std::string& model);
 
-} // namespace crampfit
+}  // namespace crampfit

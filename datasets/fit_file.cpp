@@ -40,17 +40,16 @@ const char* const parameter_units = "of parameters/unit";
 const char* const residual_units = "m for displacement and crack length, N for force, s for time";
 
 /// Copies one member of every row into a column of its own.
-template <class Row, class Value> std::vector<Value> column_of(const std::vector<Row>& rows, Value Row::*member) {
+template <class Row, class Value>
+std::vector<Value> column_of(const std::vector<Row>& rows, Value Row::*member) {
     std::vector<Value> column;
-    for (const Row& row : rows)
-        column.push_back(row.*member);
+    for (const Row& row : rows) column.push_back(row.*member);
     return column;
 }
 
 template <class Row, class Value>
 void fill_column(std::vector<Row>& rows, Value Row::*member, const std::vector<Value>& column) {
-    for (std::size_t i = 0; i < rows.size(); ++i)
-        rows[i].*member = column[i];
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].*member = column[i];
 }
 
 // ---- parameters
@@ -62,8 +61,7 @@ void write_parameters(Group& root, const std::vector<FittedParameter>& parameter
     for (const NumberColumn& column : parameter_numbers)
         group.write(column.name, column_of(parameters, column.value), {parameter_units, column.description});
     std::vector<std::uint8_t> at_bound;
-    for (const FittedParameter& parameter : parameters)
-        at_bound.push_back(parameter.at_bound);
+    for (const FittedParameter& parameter : parameters) at_bound.push_back(parameter.at_bound);
     group.write("at_bound", at_bound, {"1", "1 where the best value lies at a bound, 0 elsewhere"});
 }
 
@@ -74,8 +72,7 @@ std::vector<FittedParameter> read_parameters(const Group& group) {
     for (const NumberColumn& column : parameter_numbers)
         fill_column(parameters, column.value, group.read_column<double>(column.name, parameters.size()));
     const std::vector<std::uint8_t> at_bound = group.read_column<std::uint8_t>("at_bound", parameters.size());
-    for (std::size_t i = 0; i < parameters.size(); ++i)
-        parameters[i].at_bound = at_bound[i] != 0;
+    for (std::size_t i = 0; i < parameters.size(); ++i) parameters[i].at_bound = at_bound[i] != 0;
     return parameters;
 }
 
@@ -101,10 +98,8 @@ Eigen::MatrixXd read_matrix(const Group& root, const char* matrix_name, std::siz
 void write_runs(Group& root, const std::vector<FitRun>& runs, std::size_t parameters) {
     Group group = root.make_group("runs", "every forward run of the fit; the table `runs`");
     std::vector<double> values;
-    for (const FitRun& run : runs)
-        values.insert(values.end(), run.parameters.begin(), run.parameters.end());
-    group.write("parameters", values, {runs.size(), parameters},
-                {parameter_units, "a row a run, a column a parameter"});
+    for (const FitRun& run : runs) values.insert(values.end(), run.parameters.begin(), run.parameters.end());
+    group.write("parameters", values, {runs.size(), parameters}, {parameter_units, "a row a run, a column a parameter"});
     group.write("misfit", column_of(runs, &FitRun::misfit),
                 {"1", "sum of squared weighted residuals; infinite when the run failed"});
     group.write_texts("status", column_of(runs, &FitRun::status), "how the run ended");
@@ -176,8 +171,7 @@ void write_checks(Group& root, const std::vector<FitCheck>& checks) {
     group.write_texts("experiment", column_of(checks, &FitCheck::experiment), "name of the experiment");
     group.write_texts("kind", column_of(checks, &FitCheck::kind), "force, arrival, or u_x or u_y of a displacement field");
     std::vector<std::int64_t> points;
-    for (const FitCheck& check : checks)
-        points.push_back(check.points);
+    for (const FitCheck& check : checks) points.push_back(check.points);
     group.write("points", points, {"1", "points compared"});
     for (const CheckColumn& column : check_numbers)
         group.write(column.name, column_of(checks, column.value), {"1", column.description});
@@ -188,8 +182,7 @@ std::vector<FitCheck> read_checks(const Group& group) {
     fill_column(checks, &FitCheck::experiment, group.read_texts("experiment", checks.size()));
     fill_column(checks, &FitCheck::kind, group.read_texts("kind", checks.size()));
     const auto points = group.read_column<std::int64_t>("points", checks.size());
-    for (std::size_t i = 0; i < checks.size(); ++i)
-        checks[i].points = static_cast<int>(points[i]);
+    for (std::size_t i = 0; i < checks.size(); ++i) checks[i].points = static_cast<int>(points[i]);
     for (const CheckColumn& column : check_numbers)
         fill_column(checks, column.value, group.read_column<double>(column.name, checks.size()));
     return checks;
@@ -248,8 +241,7 @@ void write_models(Group& root, const std::vector<ComparedModel>& models, std::si
     for (const ModelColumn& column : model_numbers)
         group.write(column.name, column_of(models, column.value), {"1", column.description});
     std::vector<double> values;
-    for (const ComparedModel& model : models)
-        values.insert(values.end(), model.values.begin(), model.values.end());
+    for (const ComparedModel& model : models) values.insert(values.end(), model.values.begin(), model.values.end());
     group.write("parameters", values, {models.size(), parameters}, {parameter_units, "a row a model, a column a parameter"});
 }
 
@@ -285,8 +277,7 @@ std::vector<ProfilePoint> read_profile(const Group& group) {
 void write_posterior(Group& root, const std::vector<PosteriorSample>& samples, std::size_t parameters) {
     Group group = root.make_group("posterior", "samples of the posterior; the table `posterior`");
     std::vector<double> values;
-    for (const PosteriorSample& sample : samples)
-        values.insert(values.end(), sample.parameters.begin(), sample.parameters.end());
+    for (const PosteriorSample& sample : samples) values.insert(values.end(), sample.parameters.begin(), sample.parameters.end());
     group.write("parameters", values, {samples.size(), parameters}, {parameter_units, "a row a sample, a column a parameter"});
     group.write("misfit", column_of(samples, &PosteriorSample::misfit), {"1", "sum of squared weighted residuals"});
 }
@@ -304,10 +295,8 @@ std::vector<PosteriorSample> read_posterior(const Group& group, std::size_t para
 
 FitStatus read_status(const Group& root) {
     const std::string text = root.read_text("status");
-    for (const FitStatus status :
-         {FitStatus::converged, FitStatus::run_limit, FitStatus::interrupted, FitStatus::failed})
-        if (text == name(status))
-            return status;
+    for (const FitStatus status : {FitStatus::converged, FitStatus::run_limit, FitStatus::interrupted, FitStatus::failed})
+        if (text == name(status)) return status;
     root.refuse("status", text, "must be converged, run limit, interrupted or failed");
 }
 
@@ -364,8 +353,7 @@ Fit read_fit(const std::filesystem::path& file) {
     fit.checks = read_checks(root.group("checks"));
     fit.distances = read_distances(root.group("distances"));
     fit.models = read_models(root.group("models"), fit.parameters.size());
-    if (root.has("crack paths"))
-        fit.crack_paths = read_crack_paths(root);
+    if (root.has("crack paths")) fit.crack_paths = read_crack_paths(root);
     fit.profile = read_profile(root.group("profile"));
     fit.posterior = read_posterior(root.group("posterior"), fit.parameters.size());
     return fit;

@@ -56,8 +56,7 @@ Id text_type() {
 }
 
 Id space_of(const Shape& shape) {
-    if (shape.empty())
-        return {H5Screate(H5S_SCALAR), H5Sclose};
+    if (shape.empty()) return {H5Screate(H5S_SCALAR), H5Sclose};
     const std::vector<hsize_t> lengths(shape.begin(), shape.end());
     return {H5Screate_simple(static_cast<int>(lengths.size()), lengths.data(), nullptr), H5Sclose};
 }
@@ -72,8 +71,7 @@ std::string in_words(const Shape& shape) {
 
 std::string in_words(const ExpectedShape& expected) {
     std::vector<std::string> lengths;
-    for (const auto& length : expected)
-        lengths.push_back(length ? std::to_string(*length) : "any");
+    for (const auto& length : expected) lengths.push_back(length ? std::to_string(*length) : "any");
     return lengths.empty() ? "a single value" : fmt::format("[{}]", fmt::join(lengths, " x "));
 }
 
@@ -102,8 +100,7 @@ void Group::refuse(const std::string& name, const std::string& found, const std:
 }
 
 void Group::check(bool succeeded, const std::string& name, const char* action) const {
-    if (!succeeded)
-        refuse(name, "damaged", fmt::format("HDF5 must be able to {} it", action));
+    if (!succeeded) refuse(name, "damaged", fmt::format("HDF5 must be able to {} it", action));
 }
 
 Group Group::make_group(const std::string& name, const std::string& description) {
@@ -115,8 +112,7 @@ Group Group::make_group(const std::string& name, const std::string& description)
 bool Group::has(const std::string& name) const { return H5Lexists(id_.get(), name.c_str(), H5P_DEFAULT) > 0; }
 
 Group Group::group(const std::string& name) const {
-    if (!has(name))
-        refuse(name, "missing", "the file must hold this group");
+    if (!has(name)) refuse(name, "missing", "the file must hold this group");
     Id id(H5Gopen2(id_.get(), name.c_str(), H5P_DEFAULT), H5Gclose);
     check(id.valid(), name, "open");
     return {std::move(id), file_, path_ + name + "/"};
@@ -151,8 +147,7 @@ std::string Group::attribute_of(const std::string& dataset, const std::string& n
     return text;
 }
 
-Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape& shape,
-                         std::size_t bytes_per_value) const {
+Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape& shape, std::size_t bytes_per_value) const {
     const Id space = space_of(shape);
     const Id properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
     if (!shape.empty() && product(shape) * bytes_per_value >= compress_from) {
@@ -163,20 +158,18 @@ Id Group::create_dataset(const std::string& name, std::int64_t type, const Shape
         H5Pset_shuffle(properties.get());
         H5Pset_deflate(properties.get(), compression_level);
     }
-    Id dataset(H5Dcreate2(id_.get(), name.c_str(), type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
-               H5Dclose);
+    Id dataset(H5Dcreate2(id_.get(), name.c_str(), type, space.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT), H5Dclose);
     check(dataset.valid(), name, "create");
     return dataset;
 }
 
-void Group::write_numbers(const std::string& name, Element element, const void* values, std::size_t count,
-                          const Shape& shape, const Meaning& meaning) {
+void Group::write_numbers(const std::string& name, Element element, const void* values, std::size_t count, const Shape& shape,
+                          const Meaning& meaning) {
     if (product(shape) != count)
         throw std::logic_error(fmt::format("{}{}: {} values do not fill {}", path_, name, count, in_words(shape)));
     const Types types = types_of(element);
     const Id dataset = create_dataset(name, types.file, shape, types.bytes);
-    check(count == 0 || H5Dwrite(dataset.get(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name,
-          "write");
+    check(count == 0 || H5Dwrite(dataset.get(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, name, "write");
     check(put_attribute(dataset.get(), "units", meaning.units), name, "write");
     check(put_attribute(dataset.get(), "description", meaning.description), name, "write");
 }
@@ -186,10 +179,9 @@ void Group::write_strings(const std::string& name, const std::vector<std::string
     const Id type = text_type();
     const Id dataset = create_dataset(name, type.get(), shape, 0);
     std::vector<const char*> characters;
-    for (const std::string& text : texts)
-        characters.push_back(text.c_str());
-    check(texts.empty() || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, characters.data()) >= 0,
-          name, "write");
+    for (const std::string& text : texts) characters.push_back(text.c_str());
+    check(texts.empty() || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, characters.data()) >= 0, name,
+          "write");
     check(put_attribute(dataset.get(), "description", description), name, "write");
 }
 
@@ -197,14 +189,12 @@ void Group::write_text(const std::string& name, const std::string& text, const s
     write_strings(name, {text}, {}, description);
 }
 
-void Group::write_texts(const std::string& name, const std::vector<std::string>& texts,
-                        const std::string& description) {
+void Group::write_texts(const std::string& name, const std::vector<std::string>& texts, const std::string& description) {
     write_strings(name, texts, {texts.size()}, description);
 }
 
 Id Group::open_dataset(const std::string& name) const {
-    if (!has(name))
-        refuse(name, "missing", "the file must hold this dataset");
+    if (!has(name)) refuse(name, "missing", "the file must hold this dataset");
     Id dataset(H5Dopen2(id_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
     check(dataset.valid(), name, "open");
     return dataset;
@@ -217,8 +207,7 @@ Shape Group::checked_shape(const std::string& name, const Id& dataset, const Exp
     std::vector<hsize_t> lengths(static_cast<std::size_t>(dimensions));
     H5Sget_simple_extent_dims(space.get(), lengths.data(), nullptr);
     const Shape shape(lengths.begin(), lengths.end());
-    if (!fits(shape, expected))
-        refuse(name, in_words(shape), "the shape must be " + in_words(expected));
+    if (!fits(shape, expected)) refuse(name, in_words(shape), "the shape must be " + in_words(expected));
     return shape;
 }
 
@@ -229,8 +218,8 @@ void Group::read_numbers(const std::string& name, Element element, const Expecte
     const Types types = types_of(element);
     if (H5Tget_class(stored.get()) != types.kind || H5Tget_size(stored.get()) > types.bytes)
         refuse(name, "another type",
-               fmt::format("must hold {} of at most {} bytes",
-                           types.kind == H5T_FLOAT ? "floating-point numbers" : "integers", types.bytes));
+               fmt::format("must hold {} of at most {} bytes", types.kind == H5T_FLOAT ? "floating-point numbers" : "integers",
+                           types.bytes));
     shape = checked_shape(name, dataset, expected);
     const std::size_t count = product(shape);
     void* values = make_room(count);
@@ -240,18 +229,15 @@ void Group::read_numbers(const std::string& name, Element element, const Expecte
 std::vector<std::string> Group::read_strings(const std::string& name, const ExpectedShape& expected) const {
     const Id dataset = open_dataset(name);
     const Id stored(H5Dget_type(dataset.get()), H5Tclose);
-    if (H5Tis_variable_str(stored.get()) <= 0)
-        refuse(name, "another type", "must hold text of any length");
+    if (H5Tis_variable_str(stored.get()) <= 0) refuse(name, "another type", "must hold text of any length");
     const std::size_t count = product(checked_shape(name, dataset, expected));
-    if (count == 0)
-        return {};
+    if (count == 0) return {};
     const Id type = text_type();
     const Id space(H5Dget_space(dataset.get()), H5Sclose);
     std::vector<char*> characters(count, nullptr);
     check(H5Dread(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, characters.data()) >= 0, name, "read");
     std::vector<std::string> texts;
-    for (const char* text : characters)
-        texts.emplace_back(text ? text : "");
+    for (const char* text : characters) texts.emplace_back(text ? text : "");
     H5Dvlen_reclaim(type.get(), space.get(), H5P_DEFAULT, characters.data());
     return texts;
 }
@@ -266,15 +252,11 @@ Group open(const std::filesystem::path& file) {
     silence();
     const std::string name = file.string();
     std::error_code error;
-    if (!std::filesystem::exists(file, error))
-        throw InputError(name, "", "", "the file does not exist");
-    if (!std::filesystem::is_regular_file(file, error))
-        throw InputError(name, "", "", "must be a plain file");
-    if (H5Fis_hdf5(name.c_str()) <= 0)
-        throw InputError(name, "", "", "cannot be read as an HDF5 file");
+    if (!std::filesystem::exists(file, error)) throw InputError(name, "", "", "the file does not exist");
+    if (!std::filesystem::is_regular_file(file, error)) throw InputError(name, "", "", "must be a plain file");
+    if (H5Fis_hdf5(name.c_str()) <= 0) throw InputError(name, "", "", "cannot be read as an HDF5 file");
     const Id id(H5Fopen(name.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-    if (!id.valid())
-        throw InputError(name, "", "", "is damaged: HDF5 must be able to open it");
+    if (!id.valid()) throw InputError(name, "", "", "is damaged: HDF5 must be able to open it");
     // The root keeps the file open after `id` has gone.
     Group root(Id(H5Gopen2(id.get(), "/", H5P_DEFAULT), H5Gclose), name, "");
     if (root.attribute("program") != "crampfit")
@@ -285,8 +267,7 @@ Group open(const std::filesystem::path& file) {
 Group open(const std::filesystem::path& file, const std::string& kind) {
     Group root = open(file);
     const std::string found = root.attribute("kind");
-    if (found != kind)
-        root.refuse("kind", found, fmt::format("a {} file is needed here", kind));
+    if (found != kind) root.refuse("kind", found, fmt::format("a {} file is needed here", kind));
     return root;
 }
 
@@ -299,8 +280,7 @@ void save(const std::filesystem::path& file, const std::string& kind, const std:
     const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     H5Pset_fapl_core(access.get(), chunk_bytes, false);
     const Id id(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose);
-    if (!id.valid())
-        throw InputError(name, "", "", "HDF5 could not make the file in memory");
+    if (!id.valid()) throw InputError(name, "", "", "HDF5 could not make the file in memory");
     {
         Group root(Id(H5Gopen2(id.get(), "/", H5P_DEFAULT), H5Gclose), name, "");
         root.set_attribute("program", "crampfit");
@@ -311,8 +291,7 @@ void save(const std::filesystem::path& file, const std::string& kind, const std:
     }
     const bool flushed = H5Fflush(id.get(), H5F_SCOPE_LOCAL) >= 0;
     const ssize_t bytes = flushed ? H5Fget_file_image(id.get(), nullptr, 0) : -1;
-    if (bytes < 0)
-        throw InputError(name, "", "", "HDF5 could not finish the file");
+    if (bytes < 0) throw InputError(name, "", "", "HDF5 could not finish the file");
     std::string image(static_cast<std::size_t>(bytes), '\0');
     if (H5Fget_file_image(id.get(), image.data(), image.size()) != bytes)
         throw InputError(name, "", "", "HDF5 could not finish the file");

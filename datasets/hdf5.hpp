@@ -23,8 +23,7 @@ class Id {
     Id(Id&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
     Id& operator=(Id&&) = delete;
     ~Id() {
-        if (id_ >= 0)
-            close_(id_);
+        if (id_ >= 0) close_(id_);
     }
     std::int64_t get() const { return id_; }
     bool valid() const { return id_ >= 0; }
@@ -49,16 +48,21 @@ struct Meaning {
 /// Kinds of numbers that files hold.
 enum class Element { byte, integer, single_precision, double_precision };
 
-template <class T> inline constexpr Element element_of = Element::double_precision;
-template <> inline constexpr Element element_of<std::uint8_t> = Element::byte;
-template <> inline constexpr Element element_of<std::int64_t> = Element::integer;
-template <> inline constexpr Element element_of<float> = Element::single_precision;
+template <class T>
+inline constexpr Element element_of = Element::double_precision;
+template <>
+inline constexpr Element element_of<std::uint8_t> = Element::byte;
+template <>
+inline constexpr Element element_of<std::int64_t> = Element::integer;
+template <>
+inline constexpr Element element_of<float> = Element::single_precision;
 
 template <class T>
-concept Number = std::is_same_v<T, std::uint8_t> || std::is_same_v<T, std::int64_t> || std::is_same_v<T, float> ||
-    std::is_same_v<T, double>;
+concept Number =
+    std::is_same_v<T, std::uint8_t> || std::is_same_v<T, std::int64_t> || std::is_same_v<T, float> || std::is_same_v<T, double>;
 
-template <Number T> struct Array {
+template <Number T>
+struct Array {
     Shape shape;
     std::vector<T> values;  // last dimension fastest
 };
@@ -66,8 +70,7 @@ template <Number T> struct Array {
 /// A group of a file, or the file's root.
 class Group {
   public:
-    Group(Id id, std::string file, std::string path)
-        : id_(std::move(id)), file_(std::move(file)), path_(std::move(path)) {}
+    Group(Id id, std::string file, std::string path) : id_(std::move(id)), file_(std::move(file)), path_(std::move(path)) {}
 
     Group make_group(const std::string& name, const std::string& description);
     Group group(const std::string& name) const;
@@ -83,10 +86,12 @@ class Group {
     void write(const std::string& name, const std::vector<T>& values, const Shape& shape, const Meaning& meaning) {
         write_numbers(name, element_of<T>, values.data(), values.size(), shape, meaning);
     }
-    template <Number T> void write(const std::string& name, const std::vector<T>& column, const Meaning& meaning) {
+    template <Number T>
+    void write(const std::string& name, const std::vector<T>& column, const Meaning& meaning) {
         write(name, column, {column.size()}, meaning);
     }
-    template <Number T> void write(const std::string& name, T value, const Meaning& meaning) {
+    template <Number T>
+    void write(const std::string& name, T value, const Meaning& meaning) {
         write(name, std::vector<T>{value}, {}, meaning);
     }
     /// Small vectors of `Size` components become rows of an array.
@@ -98,7 +103,8 @@ class Group {
     void write_text(const std::string& name, const std::string& text, const std::string& description);
     void write_texts(const std::string& name, const std::vector<std::string>& texts, const std::string& description);
 
-    template <Number T> Array<T> read(const std::string& name, const ExpectedShape& expected) const {
+    template <Number T>
+    Array<T> read(const std::string& name, const ExpectedShape& expected) const {
         Array<T> array;
         read_numbers(name, element_of<T>, expected, array.shape, [&](std::size_t count) {
             array.values.resize(count);
@@ -106,7 +112,10 @@ class Group {
         });
         return array;
     }
-    template <Number T> T read_number(const std::string& name) const { return read<T>(name, {}).values.front(); }
+    template <Number T>
+    T read_number(const std::string& name) const {
+        return read<T>(name, {}).values.front();
+    }
     /// Without `rows`: any number of rows.
     template <Number T>
     std::vector<T> read_column(const std::string& name, std::optional<std::size_t> rows = std::nullopt) const {
@@ -128,15 +137,14 @@ class Group {
     [[noreturn]] void refuse(const std::string& name, const std::string& found, const std::string& rule) const;
 
   private:
-    void write_numbers(const std::string& name, Element element, const void* values, std::size_t count,
-                       const Shape& shape, const Meaning& meaning);
+    void write_numbers(const std::string& name, Element element, const void* values, std::size_t count, const Shape& shape,
+                       const Meaning& meaning);
     void read_numbers(const std::string& name, Element element, const ExpectedShape& expected, Shape& shape,
                       const std::function<void*(std::size_t)>& make_room) const;
     void write_strings(const std::string& name, const std::vector<std::string>& texts, const Shape& shape,
                        const std::string& description);
     std::vector<std::string> read_strings(const std::string& name, const ExpectedShape& expected) const;
-    Id create_dataset(const std::string& name, std::int64_t type, const Shape& shape,
-                      std::size_t bytes_per_value) const;
+    Id create_dataset(const std::string& name, std::int64_t type, const Shape& shape, std::size_t bytes_per_value) const;
     Id open_dataset(const std::string& name) const;
     Shape checked_shape(const std::string& name, const Id& dataset, const ExpectedShape& expected) const;
     void check(bool succeeded, const std::string& name, const char* action) const;

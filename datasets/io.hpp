@@ -46,4 +46,4 @@ Sensitivity read_sensitivity(const std::filesystem::path& file);
 /// Prints a table of any of these files as CSV (INTERFACE.md: series, path, crack1, parameters, runs, residuals, indices, ...).
 void print_table(const std::filesystem::path& file, const std::string& table, std::ostream& out);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -20,15 +20,11 @@ struct NumberRule {
 namespace limits {
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
-constexpr NumberRule positive(const Dimension& dimension) {
-    return {dimension, 0, infinity, true, "must be greater than 0"};
-}
+constexpr NumberRule positive(const Dimension& dimension) { return {dimension, 0, infinity, true, "must be greater than 0"}; }
 constexpr NumberRule not_negative(const Dimension& dimension) {
     return {dimension, 0, std::numeric_limits<double>::max(), false, "must not be negative"};
 }
-constexpr NumberRule finite(const Dimension& dimension) {
-    return {dimension, -infinity, infinity, true, "must be finite"};
-}
+constexpr NumberRule finite(const Dimension& dimension) { return {dimension, -infinity, infinity, true, "must be finite"}; }
 
 inline constexpr NumberRule thickness = positive(dimension::length);
 inline constexpr NumberRule cell = positive(dimension::length);
@@ -42,8 +38,7 @@ inline constexpr NumberRule period = positive(dimension::length);
 inline constexpr NumberRule latewood_fraction{dimension::number, 0, 1, false, "must lie between 0 and 1"};
 inline constexpr NumberRule transition = not_negative(dimension::length);
 inline constexpr NumberRule youngs_modulus = positive(dimension::pressure);
-inline constexpr NumberRule poisson_ratio{dimension::number, -1, 0.5, true,
-                                          "must lie between -1 and 0.5, both excluded"};
+inline constexpr NumberRule poisson_ratio{dimension::number, -1, 0.5, true, "must lie between -1 and 0.5, both excluded"};
 inline constexpr NumberRule orthotropic_poisson_ratio = finite(dimension::number);  // see `broken_rule`
 inline constexpr NumberRule relaxing_share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
 inline constexpr NumberRule relaxation_time = positive(dimension::time);

@@ -11,7 +11,7 @@ namespace crampfit {
 
 /// A number of a Machine.
 struct MachineNumber {
-    const char* name;           // as a study writes it
+    const char* name;  // as a study writes it
     double Machine::*value;
     NumberRule rule;
     std::vector<double> Curves::*column;  // of the data that it takes part in

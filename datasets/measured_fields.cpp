@@ -30,9 +30,10 @@ void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields
     fields.by_displacement = !curves.displacement.empty();
     fields.instants = fields.by_displacement ? curves.displacement : curves.time;
     if (fields.instants.size() != series.images.size()) {
-        at.fail(fmt::format("a time or a displacement of the loading is needed for each of the {} pictures, a row each, in their order; "
-                            "there are {}",
-                            series.images.size(), fields.instants.size()));
+        at.fail(fmt::format(
+            "a time or a displacement of the loading is needed for each of the {} pictures, a row each, in their order; "
+            "there are {}",
+            series.images.size(), fields.instants.size()));
     }
     for (std::size_t i = 0; i < fields.instants.size(); ++i) {
         if (!(fields.instants[i] >= (i > 0 ? fields.instants[i - 1] : 0.0))) {
@@ -42,7 +43,8 @@ void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields
     }
 }
 
-/// The points that are compared: as far apart as subsets are wide, so that no pixel counts twice and their errors are independent.
+/// The points that are compared: as far apart as subsets are wide, so that no pixel counts twice and their errors are
+/// independent.
 std::vector<int> independent_points(const FieldSeries& series, const Placement& placement, const Vec2& size) {
     const PointLattice& lattice = series.lattice;
     for (int every = (series.subset + lattice.step - 1) / lattice.step;; ++every) {
@@ -125,8 +127,9 @@ MeasuredFields read_measured_fields(const Entry& entry, const Scene& scene) {
         }
     });
     if (followed == 0) {
-        entry.fail(fmt::format("no point that was followed lies on the specimen, {:g} x {:g} mm: check pixel, offset and rotation",
-                               1e3 * scene.specimen.size.x(), 1e3 * scene.specimen.size.y()));
+        entry.fail(
+            fmt::format("no point that was followed lies on the specimen, {:g} x {:g} mm: check pixel, offset and rotation",
+                        1e3 * scene.specimen.size.x(), 1e3 * scene.specimen.size.y()));
     }
     return fields;
 }

@@ -50,7 +50,8 @@ class NumberFinder {
         throw InputError(file_, key_, value_, "is no number of this scene that can be adjusted" + reason);
     }
 
-    template <class Map> static std::vector<std::string> names_of(const Map& map) {
+    template <class Map>
+    static std::vector<std::string> names_of(const Map& map) {
         std::vector<std::string> names;
         for (const auto& [name, value] : map) {
             names.push_back(name);
@@ -123,8 +124,7 @@ class NumberFinder {
             fail(": the specimen has neither image nor file");
         }
         const SpecimenPlan& plan = scene_.specimen;
-        return member({{"rotation", {plan.picture ? &plan.picture->rotation : &plan.file_rotation, limits::rotation}}},
-                      1);
+        return member({{"rotation", {plan.picture ? &plan.picture->rotation : &plan.file_rotation, limits::rotation}}}, 1);
     }
 
     SceneNumber in_crack() const {
@@ -132,9 +132,11 @@ class NumberFinder {
         if (number == scene_.cracks.size()) {
             fail(fmt::format(": there is no crack {}; cracks are numbered from 0", part(1)));
         }
-        if (const auto& bridging = scene_.cracks[number].faces.bridging; bridging && part(2) == "faces" && part(3) == "traction") {
+        if (const auto& bridging = scene_.cracks[number].faces.bridging;
+            bridging && part(2) == "faces" && part(3) == "traction") {
             return member({{"stress", {&bridging->stress, limits::bridging_stress}},
-                           {"opening", {&bridging->opening, limits::bridging_opening}}}, 4);
+                           {"opening", {&bridging->opening, limits::bridging_opening}}},
+                          4);
         }
         if (part(2) == "faces") {
             return friction(scene_.cracks[number].faces, CrackFaces::Kind::friction);
@@ -142,7 +144,8 @@ class NumberFinder {
         return member({{"advance", {&scene_.cracks[number].advance, limits::advance}}}, 2);
     }
 
-    template <class Member> const Member& named(const std::vector<Member>& list) const {
+    template <class Member>
+    const Member& named(const std::vector<Member>& list) const {
         for (const Member& candidate : list) {
             if (candidate.name == part(1)) {
                 return candidate;
@@ -179,7 +182,8 @@ class NumberFinder {
         }
         if (part(2) == "force") {
             const SceneNumber number = member({{"0", {body.free[0] ? &body.force.x() : nullptr, limits::force}},
-                                               {"1", {body.free[1] ? &body.force.y() : nullptr, limits::force}}}, 3);
+                                               {"1", {body.free[1] ? &body.force.y() : nullptr, limits::force}}},
+                                              3);
             if (number.value == nullptr) {
                 fail(": this component's velocity is prescribed");
             }
@@ -189,7 +193,8 @@ class NumberFinder {
     }
 
     /// The coefficient of a contact or of crack faces, in the last part of the key.
-    template <class Meeting> SceneNumber friction(const Meeting& meeting, typename Meeting::Kind rubs) const {
+    template <class Meeting>
+    SceneNumber friction(const Meeting& meeting, typename Meeting::Kind rubs) const {
         if (meeting.kind != rubs) {
             fail(": there is no friction here");
         }
@@ -220,8 +225,7 @@ void set_number(Scene& scene, const std::string& key, double value) {
     if (!number.rule.allows(value)) {
         throw InputError(file, key, text, number.rule.rule);
     }
-    double& slot =
-        const_cast<double&>(*number.value);  // the scene is ours to change; finding needs no second, mutable copy
+    double& slot = const_cast<double&>(*number.value);  // the scene is ours to change; finding needs no second, mutable copy
     const double before = std::exchange(slot, value);
     try {
         if (scene.specimen.rings) {

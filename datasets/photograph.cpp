@@ -58,8 +58,8 @@ Photograph read_photograph(const Entry& entry, const Scene& scene) {
         return (place.array() >= 0.0).all() && (place.array() <= size.array()).all();
     });
     if (!touches) {
-        entry.fail(fmt::format("the crack's path does not lie on the specimen, {:g} x {:g} mm: check pixel, offset and rotation", 1e3 * size.x(),
-                               1e3 * size.y()));
+        entry.fail(fmt::format("the crack's path does not lie on the specimen, {:g} x {:g} mm: check pixel, offset and rotation",
+                               1e3 * size.x(), 1e3 * size.y()));
     }
     return photograph;
 }

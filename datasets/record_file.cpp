@@ -15,8 +15,7 @@ const std::array<SeriesColumn, 13> series_columns{{
      [](Instant& i) -> double& { return i.displacement; }},
     {"force", "N", "force_N", "reaction at the load cell, for the given thickness",
      [](Instant& i) -> double& { return i.force; }},
-    {"crack_length", "m", "crack_length_m", "length of the tracked crack",
-     [](Instant& i) -> double& { return i.crack_length; }},
+    {"crack_length", "m", "crack_length_m", "length of the tracked crack", [](Instant& i) -> double& { return i.crack_length; }},
     {"tip_x", "m", "tip_x_m", "tip of the tracked crack in the undeformed specimen",
      [](Instant& i) -> double& { return i.tip.x(); }},
     {"tip_y", "m", "tip_y_m", "tip of the tracked crack in the undeformed specimen",
@@ -55,8 +54,7 @@ std::string numbered(std::size_t number) { return fmt::format("{:04}", number); 
 void write_component(Group& group, const std::string& component, const std::vector<Vec2>& vectors, int axis,
                      const hdf5::Meaning& meaning) {
     std::vector<double> column;
-    for (const Vec2& vector : vectors)
-        column.push_back(vector[axis]);
+    for (const Vec2& vector : vectors) column.push_back(vector[axis]);
     group.write(component, column, meaning);
 }
 
@@ -64,8 +62,7 @@ std::vector<Vec2> read_components(const Group& group, const std::string& stem, s
     const std::vector<double> x = group.read_column<double>(stem + "_x", rows);
     const std::vector<double> y = group.read_column<double>(stem + "_y", rows);
     std::vector<Vec2> vectors(rows);
-    for (std::size_t i = 0; i < rows; ++i)
-        vectors[i] = {x[i], y[i]};
+    for (std::size_t i = 0; i < rows; ++i) vectors[i] = {x[i], y[i]};
     return vectors;
 }
 
@@ -75,8 +72,7 @@ void write_series(Group& root, std::vector<Instant> series) {
     Group group = root.make_group("series", "what was measured at each saved instant; the table `series`");
     for (const SeriesColumn& column : series_columns) {
         std::vector<double> values;
-        for (Instant& instant : series)
-            values.push_back(column.value(instant));
+        for (Instant& instant : series) values.push_back(column.value(instant));
         group.write(column.name, values, {column.units, column.description});
     }
 }
@@ -85,8 +81,7 @@ std::vector<Instant> read_series(const Group& group) {
     std::vector<Instant> series(group.read_column<double>(series_columns.front().name).size());
     for (const SeriesColumn& column : series_columns) {
         const std::vector<double> values = group.read_column<double>(column.name, series.size());
-        for (std::size_t i = 0; i < series.size(); ++i)
-            column.value(series[i]) = values[i];
+        for (std::size_t i = 0; i < series.size(); ++i) column.value(series[i]) = values[i];
     }
     return series;
 }
@@ -113,8 +108,7 @@ void write_cracks(Group& root, const Record& record) {
 void read_cracks(const Group& root, Record& record) {
     const std::size_t rows = record.series.size();
     const Group paths = root.group("paths");
-    for (std::size_t i = 0; i < paths.size(); ++i)
-        record.paths.push_back(paths.read_rows<double, 2>(numbered(i)));
+    for (std::size_t i = 0; i < paths.size(); ++i) record.paths.push_back(paths.read_rows<double, 2>(numbered(i)));
     const Group cracks = root.group("cracks");
     for (std::size_t i = 0; i < cracks.size(); ++i) {
         const Group group = cracks.group(numbered(i));
@@ -127,15 +121,12 @@ void read_cracks(const Group& root, Record& record) {
 }
 
 void write_reactions(Group& root, const std::vector<ReactionHistory>& reactions) {
-    Group all =
-        root.make_group("reactions", "total force of each edge and body on the specimen, row by row with the series");
+    Group all = root.make_group("reactions", "total force of each edge and body on the specimen, row by row with the series");
     for (std::size_t i = 0; i < reactions.size(); ++i) {
         Group group = all.make_group(numbered(i), "one edge or body");
         group.write_text("name", reactions[i].name, "name of the edge or body in the scene");
-        write_component(group, "force_x", reactions[i].force, 0,
-                        {"N", "force on the specimen, for the given thickness"});
-        write_component(group, "force_y", reactions[i].force, 1,
-                        {"N", "force on the specimen, for the given thickness"});
+        write_component(group, "force_x", reactions[i].force, 0, {"N", "force on the specimen, for the given thickness"});
+        write_component(group, "force_y", reactions[i].force, 1, {"N", "force on the specimen, for the given thickness"});
     }
 }
 
@@ -150,16 +141,15 @@ void read_reactions(const Group& root, Record& record) {
 // ---- crack driving
 
 void write_driving(Group& root, const std::vector<CriticalLoad>& driving) {
-    Group group = root.make_group("driving", "the load at which the crack moves on from each place of its way; the table `driving`");
+    Group group =
+        root.make_group("driving", "the load at which the crack moves on from each place of its way; the table `driving`");
     std::vector<Vec2> tips;
-    for (const CriticalLoad& row : driving)
-        tips.push_back(row.tip);
+    for (const CriticalLoad& row : driving) tips.push_back(row.tip);
     write_component(group, "tip_x", tips, 0, {"m", "tip in the undeformed specimen"});
     write_component(group, "tip_y", tips, 1, {"m", "tip in the undeformed specimen"});
     for (const DrivingColumn& column : driving_columns) {
         std::vector<double> values;
-        for (const CriticalLoad& row : driving)
-            values.push_back(row.*column.value);
+        for (const CriticalLoad& row : driving) values.push_back(row.*column.value);
         group.write(column.name, values, {column.units, column.description});
     }
 }
@@ -167,12 +157,10 @@ void write_driving(Group& root, const std::vector<CriticalLoad>& driving) {
 std::vector<CriticalLoad> read_driving(const Group& group) {
     std::vector<CriticalLoad> driving(group.read_column<double>("tip_x").size());
     const std::vector<Vec2> tips = read_components(group, "tip", driving.size());
-    for (std::size_t i = 0; i < driving.size(); ++i)
-        driving[i].tip = tips[i];
+    for (std::size_t i = 0; i < driving.size(); ++i) driving[i].tip = tips[i];
     for (const DrivingColumn& column : driving_columns) {
         const std::vector<double> values = group.read_column<double>(column.name, driving.size());
-        for (std::size_t i = 0; i < driving.size(); ++i)
-            driving[i].*column.value = values[i];
+        for (std::size_t i = 0; i < driving.size(); ++i) driving[i].*column.value = values[i];
     }
     return driving;
 }
@@ -212,8 +200,7 @@ void read_frames(const Group& root, Record& record) {
 RunStatus read_status(const Group& root) {
     const std::string text = root.read_text("status");
     for (const RunStatus status : {RunStatus::finished, RunStatus::split, RunStatus::interrupted, RunStatus::unstable})
-        if (text == name(status))
-            return status;
+        if (text == name(status)) return status;
     root.refuse("status", text, "must be finished, split, interrupted or unstable");
 }
 
@@ -237,8 +224,7 @@ Record read_all_but_frames(const Group& root) {
     read_reactions(root, record);
     record.driving = read_driving(root.group("driving"));
     record.point_position = root.group("points").read_rows<double, 2>("position");
-    if (root.group("points").has("size"))
-        record.point_size = root.group("points").read_rows<double, 2>("size", 1)[0];
+    if (root.group("points").has("size")) record.point_size = root.group("points").read_rows<double, 2>("size", 1)[0];
     record.point_latewood = root.group("points").read_column<float>("latewood", record.point_position.size());
     record.scene_text = root.read_text("scene_text");
     record.explanation = root.read_text("explanation");
@@ -272,9 +258,7 @@ void write(const Record& record, const std::filesystem::path& file) {
     });
 }
 
-Record read_record_without_frames(const std::filesystem::path& file) {
-    return read_all_but_frames(hdf5::open(file, "record"));
-}
+Record read_record_without_frames(const std::filesystem::path& file) { return read_all_but_frames(hdf5::open(file, "record")); }
 
 Record read_record(const std::filesystem::path& file) {
     const Group root = hdf5::open(file, "record");

@@ -133,8 +133,9 @@ std::size_t RunJournal::read(const std::string& bytes, std::uint64_t study) {
         return 0;
     }
     if (*first != head(study)) {
-        throw InputError(file_.string(), "", "",
-                         "holds runs of another study, other scenes or data, or another version of crampfit: start without --resume");
+        throw InputError(
+            file_.string(), "", "",
+            "holds runs of another study, other scenes or data, or another version of crampfit: start without --resume");
     }
     std::size_t whole = bytes.size() - reader.rest().size();
     while (const auto content = next_entry(reader)) {

@@ -96,8 +96,8 @@ Measure read_measure(const Scene& scene, const Entry& root) {
 Model read_model(const Entry& entry) {
     entry.only({"plane", "thickness", "cell", "error", "points_per_cell"});
     Model model;
-    model.plane = entry.at("plane").choice<PlaneCondition>(
-        {{"strain", PlaneCondition::strain}, {"stress", PlaneCondition::stress}});
+    model.plane =
+        entry.at("plane").choice<PlaneCondition>({{"strain", PlaneCondition::strain}, {"stress", PlaneCondition::stress}});
     model.thickness = entry.at("thickness").number(limits::thickness);
     if (const auto error = entry.find("error")) {
         if (entry.find("cell")) {
@@ -153,11 +153,13 @@ void read_updates(const Entry& entry, SolverChoice& solver) {
 }  // namespace
 
 SolverChoice read_solver(const Entry& entry) {
-    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "strain", "damping", "extrapolate", "time_step"});
+    entry.only({"kind", "shape_function", "velocity_update", "order", "pic_share", "stress_update", "strain", "damping",
+                "extrapolate", "time_step"});
     SolverChoice solver;
     if (const auto strain = entry.find("strain")) {
-        solver.strain = strain->choice<StrainMeasure>(
-            {{"auto", StrainMeasure::automatic}, {"small", StrainMeasure::small}, {"finite rotation", StrainMeasure::finite_rotation}});
+        solver.strain = strain->choice<StrainMeasure>({{"auto", StrainMeasure::automatic},
+                                                       {"small", StrainMeasure::small},
+                                                       {"finite rotation", StrainMeasure::finite_rotation}});
     }
     if (const auto kind = entry.find("kind")) {
         solver.kind = kind->choice<SolverKind>({{"auto", SolverKind::automatic},
@@ -215,8 +217,7 @@ Output read_output(const Entry& entry) {
 Scene parse_scene(const std::string& text, const std::filesystem::path& file, const Overrides& overrides) {
     const Document document(text, file, overrides);
     const Entry root = document.root();
-    root.only({"title", "model", "specimen", "materials", "edges", "bodies", "cracks", "measure", "solver", "stop",
-               "output"});
+    root.only({"title", "model", "specimen", "materials", "edges", "bodies", "cracks", "measure", "solver", "stop", "output"});
     Scene scene;
     scene.file = file;
     scene.text = document.text();

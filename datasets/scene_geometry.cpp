@@ -31,8 +31,8 @@ bool touch(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
     if (c_side * d_side < 0 && a_side * b_side < 0) {
         return true;
     }
-    return (c_side == 0 && in_box_of(a, b, c)) || (d_side == 0 && in_box_of(a, b, d)) ||
-           (a_side == 0 && in_box_of(c, d, a)) || (b_side == 0 && in_box_of(c, d, b));
+    return (c_side == 0 && in_box_of(a, b, c)) || (d_side == 0 && in_box_of(a, b, d)) || (a_side == 0 && in_box_of(c, d, a)) ||
+           (b_side == 0 && in_box_of(c, d, b));
 }
 
 bool doubles_back(const Vec2& a, const Vec2& corner, const Vec2& b) {

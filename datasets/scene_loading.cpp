@@ -9,7 +9,8 @@ namespace crampfit {
 namespace {
 
 /// A word, or the table { friction = 0.3 }: how two surfaces meet.
-template <class Meeting> Meeting read_meeting(const Entry& entry, const Choices<typename Meeting::Kind>& words) {
+template <class Meeting>
+Meeting read_meeting(const Entry& entry, const Choices<typename Meeting::Kind>& words) {
     Meeting meeting;
     if (entry.is_table()) {
         entry.only({"friction"});
@@ -45,8 +46,7 @@ Edge read_edge(const Entry& entry, const Vec2& specimen_size) {
     entry.only({"name", "side", "range", "velocity", "traction", "until"});
     Edge edge;
     const Entry side = entry.at("side");
-    edge.side =
-        side.choice<Side>({{"top", Side::top}, {"bottom", Side::bottom}, {"left", Side::left}, {"right", Side::right}});
+    edge.side = side.choice<Side>({{"top", Side::top}, {"bottom", Side::bottom}, {"left", Side::left}, {"right", Side::right}});
     const auto name = entry.find("name");
     edge.name = name ? name->text() : side.text();
     if (const auto range = entry.find("range")) {
@@ -110,8 +110,8 @@ Body read_body(const Entry& entry, std::size_t number) {
     body.name = name ? name->text() : fmt::format("body {}", number);
     body.shape = read_shape(entry);
     if (const auto contact = entry.find("contact")) {
-        body.contact = read_meeting<Contact>(
-            *contact, {{"frictionless", Contact::Kind::frictionless}, {"bonded", Contact::Kind::bonded}});
+        body.contact =
+            read_meeting<Contact>(*contact, {{"frictionless", Contact::Kind::frictionless}, {"bonded", Contact::Kind::bonded}});
     }
     read_motion(entry, body);
     if (const auto until = entry.find("until")) {
@@ -154,7 +154,8 @@ CrackFaces read_faces(const Entry& entry) {
         entry.only({"friction", "traction"});
     }
     if (!entry.is_table() || !entry.has("traction")) {
-        return read_meeting<CrackFaces>(entry, {{"frictionless", CrackFaces::Kind::frictionless}, {"stick", CrackFaces::Kind::stick}});
+        return read_meeting<CrackFaces>(entry,
+                                        {{"frictionless", CrackFaces::Kind::frictionless}, {"stick", CrackFaces::Kind::stick}});
     }
     if (entry.has("friction")) {
         entry.fail("give one of friction and traction: faces that a traction pulls together do not rub");
@@ -179,16 +180,16 @@ Crack read_crack(const Entry& entry, const Vec2& specimen_size) {
         crack.advance = advance->number(limits::advance);
     }
     if (const auto direction = entry.find("direction")) {
-        crack.direction =
-            direction->choice<GrowthDirection>({{"normal to opening", GrowthDirection::normal_to_opening},
-                                                {"hoop stress", GrowthDirection::hoop_stress},
-                                                {"energy release rate", GrowthDirection::energy_release_rate},
-                                                {"straight", GrowthDirection::straight}});
+        crack.direction = direction->choice<GrowthDirection>({{"normal to opening", GrowthDirection::normal_to_opening},
+                                                              {"hoop stress", GrowthDirection::hoop_stress},
+                                                              {"energy release rate", GrowthDirection::energy_release_rate},
+                                                              {"straight", GrowthDirection::straight}});
     }
     if (const auto faces = entry.find("faces")) {
         crack.faces = read_faces(*faces);
         if (crack.faces.bridging && !crack.faces.bridging->on_all_faces && crack.grows == Growth::none) {
-            faces->at("traction").fail("acts where the crack grows, and this one does not: give on = \"all faces\", or let it grow");
+            faces->at("traction")
+                .fail("acts where the crack grows, and this one does not: give on = \"all faces\", or let it grow");
         }
     }
     return crack;

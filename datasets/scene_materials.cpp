@@ -15,7 +15,8 @@ bool has_axial_constants(const OrthotropicElasticity& wood) { return wood.E_L > 
 void refuse_converse_ratios(const Entry& entry) {
     for (const char* key : {"nu_TR", "nu_RL", "nu_TL"}) {
         if (const auto given = entry.find(key)) {
-            given->fail(fmt::format("give nu_{1}{0} = {2} E_{1} / E_{0} instead: strain along {0} under stress along {1}", key[3], key[4], key));
+            given->fail(fmt::format("give nu_{1}{0} = {2} E_{1} / E_{0} instead: strain along {0} under stress along {1}", key[3],
+                                    key[4], key));
         }
     }
 }
@@ -65,7 +66,8 @@ Plasticity read_plastic(const Entry& entry) {
         memory.hardening = hardening->number(limits::hardening);
     }
     if (entry.has("saturation_stress") || entry.has("saturation_strain")) {
-        memory.saturation = {entry.at("saturation_stress").number(limits::yield_stress), entry.at("saturation_strain").number(limits::plastic_strain)};
+        memory.saturation = {entry.at("saturation_stress").number(limits::yield_stress),
+                             entry.at("saturation_strain").number(limits::plastic_strain)};
     }
     return memory;
 }
@@ -76,7 +78,8 @@ std::optional<BrokenRule> broken_rule(const Material& material) {
     if (material.orthotropic) {
         return broken_rule(*material.orthotropic);
     }
-    if (material.plastic && material.plastic->saturation && material.plastic->saturation->stress < material.plastic->yield_stress) {
+    if (material.plastic && material.plastic->saturation &&
+        material.plastic->saturation->stress < material.plastic->yield_stress) {
         return BrokenRule{"saturation_stress", "must not be below yield_stress: the wood hardens as it flows"};
     }
     if (material.viscoelastic) {
@@ -86,20 +89,24 @@ std::optional<BrokenRule> broken_rule(const Material& material) {
             k += term.k;
         }
         if (g >= 1.0 || k >= 1.0) {
-            return BrokenRule{"prony", fmt::format("the sum of all {} must be below 1 and is {:.4g}: some stiffness is left for good", g >= 1.0 ? "g" : "k", std::max(g, k))};
+            return BrokenRule{"prony",
+                              fmt::format("the sum of all {} must be below 1 and is {:.4g}: some stiffness is left for good",
+                                          g >= 1.0 ? "g" : "k", std::max(g, k))};
         }
     }
     return std::nullopt;
 }
 
 std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood) {
-    const auto too_large = [](const char* key, double ratio, const char* moduli, double modulus, double other) -> std::optional<BrokenRule> {
+    const auto too_large = [](const char* key, double ratio, const char* moduli, double modulus,
+                              double other) -> std::optional<BrokenRule> {
         const double most = std::sqrt(modulus / other);
         if (std::abs(ratio) < most) {
             return std::nullopt;
         }
-        return BrokenRule{key, fmt::format("{} must lie between -{:.4g} and {:.4g}, the root of {}, or the wood could be strained without work",
-                                           key, most, most, moduli)};
+        return BrokenRule{
+            key, fmt::format("{} must lie between -{:.4g} and {:.4g}, the root of {}, or the wood could be strained without work",
+                             key, most, most, moduli)};
     };
     if (const auto broken = too_large("nu_RT", wood.nu_RT, "E_R / E_T", wood.E_R, wood.E_T)) {
         return broken;
@@ -114,18 +121,21 @@ std::optional<BrokenRule> broken_rule(const OrthotropicElasticity& wood) {
         return broken;
     }
     const double rest = 1 - wood.nu_RT * wood.nu_RT * wood.E_T / wood.E_R - wood.nu_LR * wood.nu_LR * wood.E_R / wood.E_L -
-                        wood.nu_LT * wood.nu_LT * wood.E_T / wood.E_L - 2 * wood.nu_RT * wood.nu_LR * wood.nu_LT * wood.E_T / wood.E_L;
+                        wood.nu_LT * wood.nu_LT * wood.E_T / wood.E_L -
+                        2 * wood.nu_RT * wood.nu_LR * wood.nu_LT * wood.E_T / wood.E_L;
     if (rest > 0) {
         return std::nullopt;
     }
-    return BrokenRule{"nu_RT", fmt::format("nu_RT, nu_LR and nu_LT are too large together: 1 - nu_RT^2 E_T/E_R - nu_LR^2 E_R/E_L - "
-                                           "nu_LT^2 E_T/E_L - 2 nu_RT nu_LR nu_LT E_T/E_L must be greater than 0 and is {:.4g}",
-                                           rest)};
+    return BrokenRule{"nu_RT",
+                      fmt::format("nu_RT, nu_LR and nu_LT are too large together: 1 - nu_RT^2 E_T/E_R - nu_LR^2 E_R/E_L - "
+                                  "nu_LT^2 E_T/E_L - 2 nu_RT nu_LR nu_LT E_T/E_L must be greater than 0 and is {:.4g}",
+                                  rest)};
 }
 
 std::map<std::string, SceneNumber> elastic_numbers(const Material& material) {
     if (!material.orthotropic) {
-        return {{"E", {&material.youngs_modulus, limits::youngs_modulus}}, {"nu", {&material.poisson_ratio, limits::poisson_ratio}}};
+        return {{"E", {&material.youngs_modulus, limits::youngs_modulus}},
+                {"nu", {&material.poisson_ratio, limits::poisson_ratio}}};
     }
     const OrthotropicElasticity& wood = *material.orthotropic;
     std::map<std::string, SceneNumber> numbers{{"E_R", {&wood.E_R, limits::youngs_modulus}},

@@ -82,8 +82,7 @@ std::vector<GrayClass> read_classes(const Entry& entry, const Materials& materia
         }
         for (const GrayClass& other : classes) {
             if (gray_class.low <= other.high && other.low <= gray_class.high) {
-                gray.fail(
-                    fmt::format("overlaps the range {}..{} of material {}", other.low, other.high, other.material));
+                gray.fail(fmt::format("overlaps the range {}..{} of material {}", other.low, other.high, other.material));
             }
         }
         classes.push_back(gray_class);
@@ -188,8 +187,7 @@ std::string specimen_source(const Entry& specimen) {
             continue;
         }
         if (!source.empty()) {
-            specimen.at(key).fail(
-                fmt::format("give one of material, rings, image, file; there is \"{}\" already", source));
+            specimen.at(key).fail(fmt::format("give one of material, rings, image, file; there is \"{}\" already", source));
         }
         source = key;
     }
@@ -232,8 +230,7 @@ std::map<std::string, SceneNumber> exponent_numbers(const DensityExponents& expo
 void check_rings(const Rings& rings, const Place& place, const std::string& value) {
     constexpr double rounding = 1e-12;  // of decimals
     if (rings.transition + rings.latewood_fraction * rings.period > rings.period * (1 + rounding)) {
-        throw InputError(place.file, place.key, value,
-                         "transition and latewood together are longer than the ring's period");
+        throw InputError(place.file, place.key, value, "transition and latewood together are longer than the ring's period");
     }
 }
 

@@ -10,12 +10,14 @@ using hdf5::Group;
 
 namespace {
 
-template <class Row> struct TextColumn {
+template <class Row>
+struct TextColumn {
     const char* name;
     std::string Row::*value;
     const char* description;
 };
-template <class Row> struct NumberColumn {
+template <class Row>
+struct NumberColumn {
     const char* name;
     double Row::*value;
     const char* units;
@@ -54,8 +56,7 @@ template <class Row, std::size_t Size>
 void write_columns(Group& group, const std::vector<Row>& rows, const TextColumn<Row> (&columns)[Size]) {
     for (const auto& column : columns) {
         std::vector<std::string> texts;
-        for (const Row& row : rows)
-            texts.push_back(row.*column.value);
+        for (const Row& row : rows) texts.push_back(row.*column.value);
         group.write_texts(column.name, texts, column.description);
     }
 }
@@ -64,8 +65,7 @@ template <class Row, std::size_t Size>
 void write_columns(Group& group, const std::vector<Row>& rows, const NumberColumn<Row> (&columns)[Size]) {
     for (const auto& column : columns) {
         std::vector<double> numbers;
-        for (const Row& row : rows)
-            numbers.push_back(row.*column.value);
+        for (const Row& row : rows) numbers.push_back(row.*column.value);
         group.write(column.name, numbers, {column.units, column.description});
     }
 }
@@ -75,8 +75,7 @@ void read_columns(const Group& group, std::vector<Row>& rows, const TextColumn<R
     rows.resize(group.read_texts(columns[0].name).size());
     for (const auto& column : columns) {
         const auto texts = group.read_texts(column.name, rows.size());
-        for (std::size_t i = 0; i < rows.size(); ++i)
-            rows[i].*column.value = texts[i];
+        for (std::size_t i = 0; i < rows.size(); ++i) rows[i].*column.value = texts[i];
     }
 }
 
@@ -84,8 +83,7 @@ template <class Row, std::size_t Size>
 void read_columns(const Group& group, std::vector<Row>& rows, const NumberColumn<Row> (&columns)[Size]) {
     for (const auto& column : columns) {
         const auto numbers = group.read_column<double>(column.name, rows.size());
-        for (std::size_t i = 0; i < rows.size(); ++i)
-            rows[i].*column.value = numbers[i];
+        for (std::size_t i = 0; i < rows.size(); ++i) rows[i].*column.value = numbers[i];
     }
 }
 
@@ -94,8 +92,7 @@ void read_columns(const Group& group, std::vector<Row>& rows, const NumberColumn
 void write_matrix(Group& group, const char* matrix_name, const std::vector<SensitivityRun>& runs,
                   std::vector<double> SensitivityRun::*member, std::size_t columns, const hdf5::Meaning& meaning) {
     std::vector<double> values;
-    for (const SensitivityRun& run : runs)
-        values.insert(values.end(), (run.*member).begin(), (run.*member).end());
+    for (const SensitivityRun& run : runs) values.insert(values.end(), (run.*member).begin(), (run.*member).end());
     group.write(matrix_name, values, {runs.size(), columns}, meaning);
 }
 
@@ -138,8 +135,7 @@ void read_runs(const Group& group, Sensitivity& sensitivity) {
 SensitivityStatus read_status(const Group& root) {
     const std::string text = root.read_text("status");
     for (const auto status : {SensitivityStatus::finished, SensitivityStatus::interrupted, SensitivityStatus::failed})
-        if (text == name(status))
-            return status;
+        if (text == name(status)) return status;
     root.refuse("status", text, "must be finished, interrupted or failed");
 }
 

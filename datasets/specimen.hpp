@@ -30,18 +30,18 @@ struct Specimen {
 
     int columns = 0;
     int rows = 0;
-    double pixel = 0.0;                // edge of a pixel [m]; 0: not known
-    std::vector<std::string> classes;  // material names; classes that grade into one another stand side by side
-    std::vector<std::uint8_t> label;   // [rows x columns] index into `classes`, or void_label
-    std::vector<float> grade;          // [rows x columns] or empty: 0 is class `label`, 1 is class `label + 1`, between
-                                       // them transition wood, linear in density
-    std::vector<float> density;        // [rows x columns] or empty [kg/m^3]
-    std::vector<float> orientation;    // [rows x columns] or empty: radial direction, counter-clockwise from +x [rad]
-    std::vector<float> coherency;      // [rows x columns] or empty: how plainly the picture shows it, 0..1
-    std::vector<std::uint8_t> feature; // [rows x columns] or empty: a `Feature`
+    double pixel = 0.0;                   // edge of a pixel [m]; 0: not known
+    std::vector<std::string> classes;     // material names; classes that grade into one another stand side by side
+    std::vector<std::uint8_t> label;      // [rows x columns] index into `classes`, or void_label
+    std::vector<float> grade;             // [rows x columns] or empty: 0 is class `label`, 1 is class `label + 1`, between
+                                          // them transition wood, linear in density
+    std::vector<float> density;           // [rows x columns] or empty [kg/m^3]
+    std::vector<float> orientation;       // [rows x columns] or empty: radial direction, counter-clockwise from +x [rad]
+    std::vector<float> coherency;         // [rows x columns] or empty: how plainly the picture shows it, 0..1
+    std::vector<std::uint8_t> feature;    // [rows x columns] or empty: a `Feature`
     std::vector<BorderPolyline> borders;  // from the pith outward
     std::vector<RingFigures> rings;       // from the pith outward
-    std::string source;                // where the picture came from
+    std::string source;                   // where the picture came from
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -28,14 +28,12 @@ const OptionalMap optional_maps[] = {
 void check_labels(const Group& root, const Specimen& specimen) {
     for (std::size_t i = 0; i < specimen.label.size(); ++i) {
         const std::size_t label = specimen.label[i];
-        if (label == Specimen::void_label)
-            continue;
+        if (label == Specimen::void_label) continue;
         if (label >= specimen.classes.size())
             root.refuse("label", std::to_string(label),
                         fmt::format("must be {} (no material) or less than the {} classes", Specimen::void_label,
                                     specimen.classes.size()));
-        if (specimen.grade.empty() || specimen.grade[i] == 0)
-            continue;
+        if (specimen.grade.empty() || specimen.grade[i] == 0) continue;
         if (!(specimen.grade[i] > 0 && specimen.grade[i] <= 1) || label + 1 >= specimen.classes.size())
             root.refuse("grade", fmt::format("{} in class {}", specimen.grade[i], label),
                         "must be from 0 to 1, and 0 in the last class");
@@ -59,8 +57,7 @@ std::vector<BorderPolyline> read_borders(const Group& group) {
     const auto vertex = group.read_rows<double, 2>("vertex", ring.size());
     std::vector<BorderPolyline> borders;
     for (std::size_t i = 0; i < ring.size(); ++i) {
-        if (borders.empty() || borders.back().ring != ring[i])
-            borders.push_back({ring[i], {}});
+        if (borders.empty() || borders.back().ring != ring[i]) borders.push_back({ring[i], {}});
         borders.back().points.push_back(vertex[i]);
     }
     return borders;
@@ -85,8 +82,7 @@ std::vector<RingFigures> read_rings(const Group& group) {
     const auto width = group.read_column<double>("width", ring.size());
     const auto latewood = group.read_column<double>("latewood_fraction", ring.size());
     std::vector<RingFigures> rings(ring.size());
-    for (std::size_t i = 0; i < rings.size(); ++i)
-        rings[i] = {ring[i], width[i], latewood[i]};
+    for (std::size_t i = 0; i < rings.size(); ++i) rings[i] = {ring[i], width[i], latewood[i]};
     return rings;
 }
 
@@ -103,7 +99,8 @@ void write(const Specimen& specimen, const std::filesystem::path& file) {
             if (const std::vector<float>& values = specimen.*map.values; !values.empty())
                 root.write(map.name, values, shape, map.meaning);
         if (!specimen.feature.empty())
-            root.write("feature", specimen.feature, shape, {"1", "0 wood, 1 background, 2 crack, 3 ink or dirt, 4 ray, 5 resin canal"});
+            root.write("feature", specimen.feature, shape,
+                       {"1", "0 wood, 1 background, 2 crack, 3 ink or dirt, 4 ray, 5 resin canal"});
         write_borders(root, specimen.borders);
         write_rings(root, specimen.rings);
     });
@@ -122,15 +119,11 @@ Specimen read_specimen(const std::filesystem::path& file) {
     specimen.columns = static_cast<int>(label.shape[1]);
     specimen.label = std::move(label.values);
     for (const OptionalMap& map : optional_maps)
-        if (root.has(map.name))
-            specimen.*map.values = root.read<float>(map.name, {label.shape[0], label.shape[1]}).values;
-    if (root.has("feature"))
-        specimen.feature = root.read<std::uint8_t>("feature", {label.shape[0], label.shape[1]}).values;
+        if (root.has(map.name)) specimen.*map.values = root.read<float>(map.name, {label.shape[0], label.shape[1]}).values;
+    if (root.has("feature")) specimen.feature = root.read<std::uint8_t>("feature", {label.shape[0], label.shape[1]}).values;
     // Files of earlier versions have neither.
-    if (root.has("borders"))
-        specimen.borders = read_borders(root.group("borders"));
-    if (root.has("rings"))
-        specimen.rings = read_rings(root.group("rings"));
+    if (root.has("borders")) specimen.borders = read_borders(root.group("borders"));
+    if (root.has("rings")) specimen.rings = read_rings(root.group("rings"));
     check_labels(root, specimen);
     return specimen;
 }

@@ -12,9 +12,8 @@
 namespace crampfit {
 namespace {
 
-const std::vector<std::string> study_keys{"title",     "experiments", "scene",       "outputs",
-                                          "parameters", "optimizer",   "uncertainty", "sensitivity", "runs",
-                                          "compare"};
+const std::vector<std::string> study_keys{"title",     "experiments", "scene",       "outputs", "parameters",
+                                          "optimizer", "uncertainty", "sensitivity", "runs",    "compare"};
 
 /// What --set gives, for the study itself and for all its scenes.
 struct SplitOverrides {
@@ -67,7 +66,8 @@ Machine read_machine(const Entry& experiment, const Curves& data) {
 }
 
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
-    entry.only({"name", "scene", "data", "fields", "photograph", "noise", "weight", "compliance", "force_offset", "displacement_offset"});
+    entry.only({"name", "scene", "data", "fields", "photograph", "noise", "weight", "compliance", "force_offset",
+                "displacement_offset"});
     Experiment experiment;
     const auto name = entry.find("name");
     experiment.name = name ? name->text() : fmt::format("experiment {}", number);
@@ -99,8 +99,7 @@ std::vector<Experiment> read_experiments(const Entry& list, const Overrides& sce
         experiments.push_back(read_experiment(entry, experiments.size(), scene_overrides));
         for (std::size_t i = 0; i + 1 < experiments.size(); ++i) {
             if (experiments[i].name == experiments.back().name) {
-                entry.fail(fmt::format("the name \"{}\" is taken: each experiment needs a name of its own",
-                                       experiments[i].name));
+                entry.fail(fmt::format("the name \"{}\" is taken: each experiment needs a name of its own", experiments[i].name));
             }
         }
     }
@@ -169,7 +168,8 @@ void read_models(const Entry& entry, const Overrides& scene_overrides, Study& st
             try {
                 model.scenes.push_back(read_scene(experiment.scene.file, overrides));
             } catch (const InputError& error) {
-                value.fail(fmt::format("does not suit {} of {}: {}", study.compared_key, experiment.scene.file.string(), error.rule));
+                value.fail(
+                    fmt::format("does not suit {} of {}: {}", study.compared_key, experiment.scene.file.string(), error.rule));
             }
         }
     }
@@ -183,9 +183,8 @@ SensitivityChoice read_sensitivity(const Entry& entry) {
     entry.only({"method", "samples"});
     SensitivityChoice sensitivity;
     if (const auto method = entry.find("method")) {
-        sensitivity.method = method->choice<SensitivityMethod>({{"local", SensitivityMethod::local},
-                                                                {"morris", SensitivityMethod::morris},
-                                                                {"sobol", SensitivityMethod::sobol}});
+        sensitivity.method = method->choice<SensitivityMethod>(
+            {{"local", SensitivityMethod::local}, {"morris", SensitivityMethod::morris}, {"sobol", SensitivityMethod::sobol}});
     }
     if (const auto samples = entry.find("samples")) {
         sensitivity.samples = samples->integer(2, most_samples);

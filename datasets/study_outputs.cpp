@@ -115,8 +115,8 @@ std::vector<StudyOutput> read_outputs(const Entry& list, const Study& study) {
     std::vector<StudyOutput> outputs;
     for (const Entry& entry : list.list()) {
         for (const StudyOutput& output : read_output(entry, study)) {
-            const bool twice = std::any_of(outputs.begin(), outputs.end(),
-                                           [&](const StudyOutput& other) { return other.name == output.name; });
+            const bool twice =
+                std::any_of(outputs.begin(), outputs.end(), [&](const StudyOutput& other) { return other.name == output.name; });
             if (twice) {
                 entry.fail(fmt::format("\"{}\" is asked for twice", output.name));
             }

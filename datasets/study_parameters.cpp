@@ -46,14 +46,13 @@ std::vector<Entry> key_entries(const Entry& parameter) {
 }
 
 /// Fills in the keys and returns the rule of each.
-std::vector<NumberRule> read_keys(const Entry& entry, const Study& study,
-                                  Parameter& parameter) {
+std::vector<NumberRule> read_keys(const Entry& entry, const Study& study, Parameter& parameter) {
     std::vector<NumberRule> rules;
     for (const Entry& key : key_entries(entry)) {
         rules.push_back(find_rule(key, key.text(), study));
         if (!(rules.back().dimension == rules.front().dimension)) {
-            key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}",
-                                 describe(rules.back().dimension), describe(rules.front().dimension)));
+            key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}", describe(rules.back().dimension),
+                                 describe(rules.front().dimension)));
         }
         parameter.keys.push_back(key.text());
     }
@@ -96,8 +95,7 @@ std::optional<Prior> read_prior(const Entry& parameter, const Dimension& dimensi
         return std::nullopt;
     }
     entry->only({"mean", "sd"});
-    return Prior{entry->at("mean").number(limits::finite(dimension)),
-                 entry->at("sd").number(limits::positive(dimension))};
+    return Prior{entry->at("mean").number(limits::finite(dimension)), entry->at("sd").number(limits::positive(dimension))};
 }
 
 Parameter read_parameter(const Entry& entry, const Study& study) {
@@ -108,8 +106,9 @@ Parameter read_parameter(const Entry& entry, const Study& study) {
     const auto name = entry.find("name");
     parameter.name = name ? name->text() : parameter.keys.front();
     const auto initial = entry.find("initial");
-    parameter.initial = !initial && study.scene ? *find_number(*study.scene, parameter.keys.front(), "", "").value / parameter.factor(0)
-                                                : read_value(entry.at("initial"), rules, parameter);
+    parameter.initial = !initial && study.scene
+                            ? *find_number(*study.scene, parameter.keys.front(), "", "").value / parameter.factor(0)
+                            : read_value(entry.at("initial"), rules, parameter);
     parameter.lower = read_value(entry.at("lower"), rules, parameter);
     parameter.upper = read_value(entry.at("upper"), rules, parameter);
     const Quantity written = entry.at(initial ? "initial" : "lower").quantity();
@@ -122,8 +121,8 @@ Parameter read_parameter(const Entry& entry, const Study& study) {
         if (initial) {
             initial->fail("must lie between lower and upper");
         }
-        entry.at("lower").fail(fmt::format("the scene's value, {:g} in SI units, must lie between lower and upper; or give initial",
-                                           parameter.initial));
+        entry.at("lower").fail(fmt::format(
+            "the scene's value, {:g} in SI units, must lie between lower and upper; or give initial", parameter.initial));
     }
     if (const auto scale = entry.find("scale")) {
         parameter.scale = scale->choice<Scale>({{"linear", Scale::linear}, {"log", Scale::logarithmic}});

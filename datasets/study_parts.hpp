@@ -8,23 +8,23 @@
 
 namespace crampfit {
 
-/// The [[parameters]] of a study; each key must be a number of one of its scenes or of an experiment's machine. `initial` may be left out where the study stands
-/// on a scene alone, and is the scene's value then. Throws InputError.
+/// The [[parameters]] of a study; each key must be a number of one of its scenes or of an experiment's machine. `initial` may be
+/// left out where the study stands on a scene alone, and is the scene's value then. Throws InputError.
 std::vector<Parameter> read_parameters(const Entry& list, const Study& study);
 
 /// The `outputs` of a study. Throws InputError.
 std::vector<StudyOutput> read_outputs(const Entry& list, const Study& study);
 
-/// How pictures of `rows` pixels' height lie on the specimen: `pixel`, `offset` and `rotation` of a table, or as the file of what was seen in
-/// them has it, whose `pixel` is used where the table gives none. Throws InputError.
+/// How pictures of `rows` pixels' height lie on the specimen: `pixel`, `offset` and `rotation` of a table, or as the file of what
+/// was seen in them has it, whose `pixel` is used where the table gives none. Throws InputError.
 Placement read_placement(const Entry& entry, const std::optional<double>& pixel, int rows);
 
-/// The `photograph` of an experiment: what to draw its crack over, and the file that `crampfit track` wrote. The picture itself is not read.
-/// Throws InputError.
+/// The `photograph` of an experiment: what to draw its crack over, and the file that `crampfit track` wrote. The picture itself
+/// is not read. Throws InputError.
 Photograph read_photograph(const Entry& entry, const Scene& scene);
 
-/// The `fields` of an experiment: the file that `crampfit correlate` wrote, or a table that also says how the picture lies on the specimen.
-/// Throws InputError.
+/// The `fields` of an experiment: the file that `crampfit correlate` wrote, or a table that also says how the picture lies on the
+/// specimen. Throws InputError.
 MeasuredFields read_measured_fields(const Entry& entry, const Scene& scene);
 
 }  // namespace crampfit

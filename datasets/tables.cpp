@@ -38,11 +38,9 @@ std::string text_of(double number) { return fmt::format("{}", number); }
 
 /// As in RFC 4180 (Shafranovich 2005), section 2, but a line ends with a line feed alone.
 std::string quoted_if_needed(const std::string& field) {
-    if (field.find_first_of(",\"\r\n") == std::string::npos)
-        return field;
+    if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
     std::string quoted = "\"";
-    for (const char character : field)
-        quoted += character == '"' ? "\"\"" : std::string(1, character);
+    for (const char character : field) quoted += character == '"' ? "\"\"" : std::string(1, character);
     return quoted + '"';
 }
 
@@ -61,31 +59,28 @@ void print(const Table& table, std::ostream& out) {
 
 Table series_table(const Record& record) {
     Table table(1);
-    for (const SeriesColumn& column : series_columns)
-        table.front().push_back(column.header);
+    for (const SeriesColumn& column : series_columns) table.front().push_back(column.header);
     for (Instant instant : record.series) {
         Row& row = table.emplace_back();
-        for (const SeriesColumn& column : series_columns)
-            row.push_back(text_of(column.value(instant)));
+        for (const SeriesColumn& column : series_columns) row.push_back(text_of(column.value(instant)));
     }
     return table;
 }
 
 Table path_table(const std::vector<Vec2>& path) {
     Table table{{"x_m", "y_m"}};
-    for (const Vec2& vertex : path)
-        table.push_back({text_of(vertex.x()), text_of(vertex.y())});
+    for (const Vec2& vertex : path) table.push_back({text_of(vertex.x()), text_of(vertex.y())});
     return table;
 }
 
 Table crack_table(const Record& record, const CrackHistory& crack) {
-    Table table{{"time_s", "displacement_m", "crack_length_m", "tip_x_m", "tip_y_m", "G_J_m2", "K_I_Pa_sqrt_m",
-                 "K_II_Pa_sqrt_m"}};
+    Table table{
+        {"time_s", "displacement_m", "crack_length_m", "tip_x_m", "tip_y_m", "G_J_m2", "K_I_Pa_sqrt_m", "K_II_Pa_sqrt_m"}};
     for (std::size_t i = 0; i < record.series.size(); ++i) {
         const Instant& instant = record.series[i];
         Row& row = table.emplace_back();
-        for (const double value : {instant.time, instant.displacement, crack.length[i], crack.tip[i].x(),
-                                   crack.tip[i].y(), crack.G[i], crack.K_I[i], crack.K_II[i]})
+        for (const double value : {instant.time, instant.displacement, crack.length[i], crack.tip[i].x(), crack.tip[i].y(),
+                                   crack.G[i], crack.K_I[i], crack.K_II[i]})
             row.push_back(text_of(value));
     }
     return table;
@@ -109,12 +104,10 @@ Table reactions_table(const Record& record) {
 
 Table driving_table(const Record& record) {
     Table table{{"tip_x_m", "tip_y_m"}};
-    for (const DrivingColumn& column : driving_columns)
-        table.front().push_back(column.header);
+    for (const DrivingColumn& column : driving_columns) table.front().push_back(column.header);
     for (const CriticalLoad& load : record.driving) {
         Row& row = table.emplace_back(Row{text_of(load.tip.x()), text_of(load.tip.y())});
-        for (const DrivingColumn& column : driving_columns)
-            row.push_back(text_of(load.*column.value));
+        for (const DrivingColumn& column : driving_columns) row.push_back(text_of(load.*column.value));
     }
     return table;
 }
@@ -125,10 +118,9 @@ std::vector<Offer> offers(const Record& record) {
     if (const auto tracked = static_cast<std::size_t>(record.tracked_crack); tracked < record.paths.size())
         offers.push_back({"path", [&record, tracked] { return path_table(record.paths[tracked]); }});
     for (std::size_t i = 0; i < record.cracks.size(); ++i) {
+        offers.push_back({fmt::format("crack{}", i + 1), [&record, i] { return crack_table(record, record.cracks[i]); }});
         offers.push_back(
-            {fmt::format("crack{}", i + 1), [&record, i] { return crack_table(record, record.cracks[i]); }});
-        offers.push_back({fmt::format("path{}", i + 1),
-                          [&record, i] { return path_table(record.paths.at(crack_number(record, i))); }});
+            {fmt::format("path{}", i + 1), [&record, i] { return path_table(record.paths.at(crack_number(record, i))); }});
     }
     offers.push_back({"driving", [&] { return driving_table(record); }});
     offers.push_back({"reactions", [&] { return reactions_table(record); }});
@@ -148,13 +140,11 @@ Table parameters_table(const Fit& fit) {
 
 Table runs_table(const Fit& fit) {
     Table table(1);
-    for (const FittedParameter& parameter : fit.parameters)
-        table.front().push_back(parameter.name);
+    for (const FittedParameter& parameter : fit.parameters) table.front().push_back(parameter.name);
     table.front().insert(table.front().end(), {"misfit", "status", "seconds"});
     for (const FitRun& run : fit.runs) {
         Row& row = table.emplace_back();
-        for (const double value : run.parameters)
-            row.push_back(text_of(value));
+        for (const double value : run.parameters) row.push_back(text_of(value));
         row.insert(row.end(), {text_of(run.misfit), run.status, text_of(run.seconds)});
     }
     return table;
@@ -170,12 +160,10 @@ Table residuals_table(const Fit& fit) {
 
 Table correlation_table(const Fit& fit) {
     Table table{{"parameter"}};
-    for (const FittedParameter& parameter : fit.parameters)
-        table.front().push_back(parameter.name);
+    for (const FittedParameter& parameter : fit.parameters) table.front().push_back(parameter.name);
     for (Eigen::Index i = 0; i < fit.correlation.rows(); ++i) {
         Row& row = table.emplace_back(Row{fit.parameters[static_cast<std::size_t>(i)].name});
-        for (Eigen::Index j = 0; j < fit.correlation.cols(); ++j)
-            row.push_back(text_of(fit.correlation(i, j)));
+        for (Eigen::Index j = 0; j < fit.correlation.cols(); ++j) row.push_back(text_of(fit.correlation(i, j)));
     }
     return table;
 }
@@ -198,22 +186,20 @@ Table distances_table(const Fit& fit) {
 
 Table models_table(const Fit& fit) {
     Table table{{"model", "status", "misfit", "AIC", "BIC", "weight"}};
-    for (const FittedParameter& parameter : fit.parameters)
-        table.front().push_back(parameter.name);
+    for (const FittedParameter& parameter : fit.parameters) table.front().push_back(parameter.name);
     for (const ComparedModel& model : fit.models) {
         Row& row = table.emplace_back();
         row.insert(row.end(), {model.name, model.status});
-        for (const double number : {model.misfit, model.aic, model.bic, model.weight})
-            row.push_back(text_of(number));
-        for (const double value : model.values)
-            row.push_back(text_of(value));
+        for (const double number : {model.misfit, model.aic, model.bic, model.weight}) row.push_back(text_of(number));
+        for (const double value : model.values) row.push_back(text_of(value));
     }
     return table;
 }
 
 Table paths_table(const Fit& fit) {
     Table table{{"experiment", "model", "crack", "x_m", "y_m"}};
-    const auto add = [&](const CrackPaths& paths, const std::string& model, const std::string& crack, const std::vector<Vec2>& vertices) {
+    const auto add = [&](const CrackPaths& paths, const std::string& model, const std::string& crack,
+                         const std::vector<Vec2>& vertices) {
         for (const Vec2& vertex : vertices)
             table.push_back({paths.experiment, model, crack, text_of(vertex.x()), text_of(vertex.y())});
     };
@@ -230,27 +216,24 @@ Table path_distances_table(const Fit& fit) {
     Table table{{"experiment", "model", "mean_m", "largest_m", "compared_length_m", "status"}};
     for (const CrackPaths& paths : fit.crack_paths)
         for (const SimulatedPath& simulated : paths.simulated)
-            table.push_back({paths.experiment, simulated.model, text_of(simulated.mean_distance), text_of(simulated.largest_distance),
-                             text_of(simulated.compared_length), simulated.status});
+            table.push_back({paths.experiment, simulated.model, text_of(simulated.mean_distance),
+                             text_of(simulated.largest_distance), text_of(simulated.compared_length), simulated.status});
     return table;
 }
 
 Table profile_table(const Fit& fit) {
     Table table{{"parameter", "value", "misfit"}};
-    for (const ProfilePoint& point : fit.profile)
-        table.push_back({point.parameter, text_of(point.value), text_of(point.misfit)});
+    for (const ProfilePoint& point : fit.profile) table.push_back({point.parameter, text_of(point.value), text_of(point.misfit)});
     return table;
 }
 
 Table posterior_table(const Fit& fit) {
     Table table(1);
-    for (const FittedParameter& parameter : fit.parameters)
-        table.front().push_back(parameter.name);
+    for (const FittedParameter& parameter : fit.parameters) table.front().push_back(parameter.name);
     table.front().push_back("misfit");
     for (const PosteriorSample& sample : fit.posterior) {
         Row& row = table.emplace_back();
-        for (const double value : sample.parameters)
-            row.push_back(text_of(value));
+        for (const double value : sample.parameters) row.push_back(text_of(value));
         row.push_back(text_of(sample.misfit));
     }
     return table;
@@ -282,17 +265,13 @@ Table indices_table(const Sensitivity& sensitivity) {
 
 Table runs_table(const Sensitivity& sensitivity) {
     Table table(1);
-    for (const StudiedParameter& parameter : sensitivity.parameters)
-        table.front().push_back(parameter.name);
-    for (const StudiedOutput& output : sensitivity.outputs)
-        table.front().push_back(output.name);
+    for (const StudiedParameter& parameter : sensitivity.parameters) table.front().push_back(parameter.name);
+    for (const StudiedOutput& output : sensitivity.outputs) table.front().push_back(output.name);
     table.front().insert(table.front().end(), {"status", "seconds"});
     for (const SensitivityRun& run : sensitivity.runs) {
         Row& row = table.emplace_back();
-        for (const double value : run.parameters)
-            row.push_back(text_of(value));
-        for (const double value : run.outputs)
-            row.push_back(text_of(value));
+        for (const double value : run.parameters) row.push_back(text_of(value));
+        for (const double value : run.outputs) row.push_back(text_of(value));
         row.insert(row.end(), {run.status, text_of(run.seconds)});
     }
     return table;
@@ -324,16 +303,15 @@ Table rings_table(const Specimen& specimen) {
 /// At some hundred places along the longer side.
 Table orientation_table(const Specimen& specimen) {
     Table table{{"x_px", "y_px", "radial_deg", "coherency"}};
-    if (specimen.orientation.empty())
-        return table;
+    if (specimen.orientation.empty()) return table;
     const int step = std::max(1, std::max(specimen.columns, specimen.rows) / 100);
     for (int y = step / 2; y < specimen.rows; y += step) {
         for (int x = step / 2; x < specimen.columns; x += step) {
             const std::size_t at = static_cast<std::size_t>(y) * specimen.columns + x;
             const double degrees = specimen.orientation[at] * 180 / std::numbers::pi;
             const double coherency = specimen.coherency.empty() ? 1 : specimen.coherency[at];
-            table.push_back({std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees),
-                             fmt::format("{:.4f}", coherency)});
+            table.push_back(
+                {std::to_string(x), std::to_string(y), fmt::format("{:.3f}", degrees), fmt::format("{:.4f}", coherency)});
         }
     }
     return table;
@@ -346,9 +324,9 @@ void print_points(const std::filesystem::path& file, std::ostream& out) {
     read_fields(file, [&](const FieldSeries& series, int image, const DisplacementField& field) {
         for (int point = 0; point < series.lattice.count(); ++point) {
             const auto i = static_cast<std::size_t>(point);
-            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point),
-                       series.lattice.y(point), field.u[i], field.v[i], field.exx[i], field.eyy[i], field.exy[i],
-                       field.zncc[i], field.sigma[i], name(field.status[i]));
+            fmt::print(out, "{},{},{},{},{},{},{},{},{},{},{}\n", image, series.lattice.x(point), series.lattice.y(point),
+                       field.u[i], field.v[i], field.exx[i], field.eyy[i], field.exy[i], field.zncc[i], field.sigma[i],
+                       name(field.status[i]));
         }
     });
 }
@@ -361,10 +339,11 @@ Table curves_table(const Curves& curves) {
         double unit;  // SI
     };
     Table table(1);
-    for (const Column& column : {Column{"time [s]", curves.time, 1}, {"displacement [mm]", curves.displacement, 1e-3},
-                                 {"force [N]", curves.force, 1}, {"crack_length [mm]", curves.crack_length, 1e-3}}) {
-        if (column.values.empty())
-            continue;
+    for (const Column& column : {Column{"time [s]", curves.time, 1},
+                                 {"displacement [mm]", curves.displacement, 1e-3},
+                                 {"force [N]", curves.force, 1},
+                                 {"crack_length [mm]", curves.crack_length, 1e-3}}) {
+        if (column.values.empty()) continue;
         table.resize(column.values.size() + 1);
         table.front().push_back(column.head);
         for (std::size_t i = 0; i < column.values.size(); ++i)
@@ -381,8 +360,7 @@ std::vector<Offer> offers(const Specimen& specimen) {
 
 Table image_table(const std::string& reference, const std::vector<std::string>& images) {
     Table table{{"image", "file"}, {"reference", reference}};
-    for (std::size_t i = 0; i < images.size(); ++i)
-        table.push_back({std::to_string(i), images[i]});
+    for (std::size_t i = 0; i < images.size(); ++i) table.push_back({std::to_string(i), images[i]});
     return table;
 }
 
@@ -414,10 +392,10 @@ std::vector<Offer> offers(const CrackTrack& track) {
             {"experiment", [&] { return curves_table(curves_of(track)); }}};
 }
 
-template <class Result> std::vector<std::string> names_of(const Result& result) {
+template <class Result>
+std::vector<std::string> names_of(const Result& result) {
     std::vector<std::string> names;
-    for (const Offer& offer : offers(result))
-        names.push_back(offer.name);
+    for (const Offer& offer : offers(result)) names.push_back(offer.name);
     return names;
 }
 
@@ -425,13 +403,11 @@ void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path&
                   std::ostream& out) {
     std::vector<std::string> names;
     for (const Offer& offer : offers) {
-        if (offer.name == wanted)
-            return print(offer.make(), out);
+        if (offer.name == wanted) return print(offer.make(), out);
         names.push_back(offer.name);
     }
     throw InputError(file.string(), "table", wanted,
-                     names.empty() ? "this file has no tables"
-                                   : fmt::format("must be one of: {}", fmt::join(names, ", ")));
+                     names.empty() ? "this file has no tables" : fmt::format("must be one of: {}", fmt::join(names, ", ")));
 }
 
 }  // namespace
@@ -440,8 +416,12 @@ std::vector<std::string> table_names(const Record& record) { return names_of(rec
 std::vector<std::string> table_names(const Fit& fit) { return names_of(fit); }
 std::vector<std::string> table_names(const Sensitivity& sensitivity) { return names_of(sensitivity); }
 
-void print_table(const Record& record, const std::string& table, std::ostream& out) { print_one_of(offers(record), "the record", table, out); }
-void print_table(const Fit& fit, const std::string& table, std::ostream& out) { print_one_of(offers(fit), "the fit", table, out); }
+void print_table(const Record& record, const std::string& table, std::ostream& out) {
+    print_one_of(offers(record), "the record", table, out);
+}
+void print_table(const Fit& fit, const std::string& table, std::ostream& out) {
+    print_one_of(offers(fit), "the fit", table, out);
+}
 void print_table(const Sensitivity& sensitivity, const std::string& table, std::ostream& out) {
     print_one_of(offers(sensitivity), "the sensitivity study", table, out);
 }

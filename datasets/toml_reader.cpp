@@ -109,10 +109,9 @@ Document::Applied Document::apply(const std::string& key, const std::string& val
         } else if (toml::array* array = node->as_array()) {
             const std::size_t member = find_member(applied.target, *array, part);
             if (member == array->size()) {
-                throw InputError(
-                    command_line, key, value,
-                    fmt::format("{} has no member \"{}\"; a member is addressed by its name or its number from 0",
-                                applied.target, part));
+                throw InputError(command_line, key, value,
+                                 fmt::format("{} has no member \"{}\"; a member is addressed by its name or its number from 0",
+                                             applied.target, part));
             }
             applied.target = join_key(applied.target, std::to_string(member));
             if (last) {
@@ -141,8 +140,8 @@ std::string Entry::written() const {
 
 std::pair<Place, std::string> Entry::origin() const {
     for (auto applied = document_->applied_.rbegin(); applied != document_->applied_.rend(); ++applied) {
-        if (address_ == applied->target || ((address_ == applied->address || is_under(address_, applied->address)) &&
-                                            is_under(applied->target, address_))) {
+        if (address_ == applied->target ||
+            ((address_ == applied->address || is_under(address_, applied->address)) && is_under(applied->target, address_))) {
             return {{command_line, applied->key}, applied->value};
         }
         if (is_under(address_, applied->target)) {

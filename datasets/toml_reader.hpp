@@ -49,7 +49,8 @@ class Document {
     std::vector<Applied> applied_;
 };
 
-template <class T> using Choices = std::vector<std::pair<std::string, T>>;
+template <class T>
+using Choices = std::vector<std::pair<std::string, T>>;
 
 /// One value of a document, with the dotted key that leads to it. What is not as asked for is an InputError that names
 /// file (or the command line), key, value and rule.
@@ -79,7 +80,8 @@ class Entry {
     std::vector<Entry> list(std::size_t size, const char* what) const;
     Vec2 point() const;                           // [m]
     std::filesystem::path existing_file() const;  // relative to the document's folder
-    template <class T> T choice(const Choices<T>& choices) const;
+    template <class T>
+    T choice(const Choices<T>& choices) const;
 
   private:
     friend class Document;
@@ -97,7 +99,8 @@ class Entry {
     std::string address_;     // list members by number
 };
 
-template <class T> T Entry::choice(const Choices<T>& choices) const {
+template <class T>
+T Entry::choice(const Choices<T>& choices) const {
     const std::string word = text();
     std::vector<std::string> words;
     for (const auto& [name, value] : choices) {

@@ -90,14 +90,13 @@ bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')
 
 Unit power(const Unit& unit, double exponent) {
     const Dimension& d = unit.dimension;
-    return {std::pow(unit.factor, exponent),
-            {d.length * exponent, d.mass * exponent, d.time * exponent, d.angle * exponent}};
+    return {std::pow(unit.factor, exponent), {d.length * exponent, d.mass * exponent, d.time * exponent, d.angle * exponent}};
 }
 
 Unit product(const Unit& a, const Unit& b) {
     return {a.factor * b.factor,
-            {a.dimension.length + b.dimension.length, a.dimension.mass + b.dimension.mass,
-             a.dimension.time + b.dimension.time, a.dimension.angle + b.dimension.angle}};
+            {a.dimension.length + b.dimension.length, a.dimension.mass + b.dimension.mass, a.dimension.time + b.dimension.time,
+             a.dimension.angle + b.dimension.angle}};
 }
 
 /// Recursive descent over: product = power { (* | / | space) power }, power = primary [^ exponent],
@@ -344,9 +343,9 @@ void check_dimension(const Quantity& quantity, const Dimension& expected, std::s
         return;
     }
     throw InputError(place.file, place.key, std::string(text),
-                     quantity.unit.empty() ? fmt::format("missing unit: expected {}", describe(expected))
-                                           : fmt::format("wrong dimension: got {}, expected {}",
-                                                         describe(quantity.dimension), describe(expected)));
+                     quantity.unit.empty()
+                         ? fmt::format("missing unit: expected {}", describe(expected))
+                         : fmt::format("wrong dimension: got {}, expected {}", describe(quantity.dimension), describe(expected)));
 }
 
 double parse_quantity(std::string_view text, const Dimension& expected, const Place& place) {

@@ -33,8 +33,7 @@ class TemporaryFile {
             const std::string name = fmt::format(".{}.{}-{}.part", final_name.filename().string(), ::getpid(), attempt);
             name_ = folder_of(final_name) / name;
             descriptor_ = ::open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-            if (descriptor_ < 0 && errno != EEXIST)
-                refuse(final_name);
+            if (descriptor_ < 0 && errno != EEXIST) refuse(final_name);
         }
     }
 
@@ -42,31 +41,24 @@ class TemporaryFile {
     TemporaryFile& operator=(const TemporaryFile&) = delete;
 
     ~TemporaryFile() {
-        if (descriptor_ >= 0)
-            ::close(descriptor_);
-        if (!renamed_)
-            ::unlink(name_.c_str());
+        if (descriptor_ >= 0) ::close(descriptor_);
+        if (!renamed_) ::unlink(name_.c_str());
     }
 
     void write(std::string_view bytes) {
         while (!bytes.empty()) {
             const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-            if (written < 0 && errno == EINTR)
-                continue;
-            if (written < 0)
-                refuse(final_name_);
+            if (written < 0 && errno == EINTR) continue;
+            if (written < 0) refuse(final_name_);
             bytes.remove_prefix(static_cast<std::size_t>(written));
         }
     }
 
     void give_final_name() {
-        if (::fsync(descriptor_) != 0)
-            refuse(final_name_);
+        if (::fsync(descriptor_) != 0) refuse(final_name_);
         // A delayed write error of a network file system shows only here.
-        if (::close(std::exchange(descriptor_, -1)) != 0)
-            refuse(final_name_);
-        if (::rename(name_.c_str(), final_name_.c_str()) != 0)
-            refuse(final_name_);
+        if (::close(std::exchange(descriptor_, -1)) != 0) refuse(final_name_);
+        if (::rename(name_.c_str(), final_name_.c_str()) != 0) refuse(final_name_);
         renamed_ = true;
     }
 
@@ -81,8 +73,7 @@ class TemporaryFile {
 /// error.
 void sync_folder(const fs::path& folder) {
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor < 0)
-        return;
+    if (descriptor < 0) return;
     ::fsync(descriptor);
     ::close(descriptor);
 }
@@ -91,11 +82,9 @@ void sync_folder(const fs::path& folder) {
 
 void require_writable(const fs::path& file) {
     std::error_code error;
-    if (!file.has_filename())
-        refuse(file, "the name of a file is needed");
+    if (!file.has_filename()) refuse(file, "the name of a file is needed");
     const fs::path folder = folder_of(file);
-    if (!fs::is_directory(folder, error))
-        refuse(file, fmt::format("the folder '{}' does not exist", folder.string()));
+    if (!fs::is_directory(folder, error)) refuse(file, fmt::format("the folder '{}' does not exist", folder.string()));
     // Renaming onto a device or a pipe would replace it.
     if (fs::exists(file, error) && !fs::is_regular_file(file, error))
         refuse(file, "something that is not a plain file has that name");

@@ -12,10 +12,14 @@ namespace {
 bool on_side(const Layout& layout, Side side, const Vec2& x) {
     const Vec2 near = 1e-6 * layout.cell;
     switch (side) {
-        case Side::left: return x.x() < near.x();
-        case Side::right: return x.x() > layout.size().x() - near.x();
-        case Side::bottom: return x.y() < near.y();
-        case Side::top: return x.y() > layout.size().y() - near.y();
+    case Side::left:
+        return x.x() < near.x();
+    case Side::right:
+        return x.x() > layout.size().x() - near.x();
+    case Side::bottom:
+        return x.y() < near.y();
+    case Side::top:
+        return x.y() > layout.size().y() - near.y();
     }
     return false;
 }
@@ -33,7 +37,7 @@ Shape widened(const Shape& shape, double by) {
     return wide;
 }
 
-} // namespace
+}  // namespace
 
 Gauges::Gauges(const Scene& scene) {
     const int edges = static_cast<int>(scene.edges.size());
@@ -69,7 +73,8 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
     std::vector<double> mass(fields, 0.0);
     const Points& points = body.points;
     for (int p = 0; p < points.count(); ++p)
-        for (int k = 0; k < body.layout.nodes_per_cell(); ++k) mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+        for (int k = 0; k < body.layout.nodes_per_cell(); ++k)
+            mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
     return mass;
 }
 
@@ -100,7 +105,8 @@ void Boundary::hold_nodes(const CrackFields& cracks) {
                 if (edge.velocity[axis]) hold(n, axis, e);
         }
         if (found == 0)
-            throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no node of the grid lies on this stretch of the side");
+            throw InputError(scene_.file.string(), "edges." + edge.name, "range",
+                             "no node of the grid lies on this stretch of the side");
     }
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Body& grip = scene_.bodies[b];
@@ -141,7 +147,8 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
         for (std::size_t i = 0; i < on_nodes; ++i) {
             const Held node = held[i];
             if (node.field != cracks.node_of_field[f]) continue;
-            if (node.driver >= edges_ || lies_at(scene_.edges[node.driver], f, node.field)) held.push_back({f, node.axis, node.driver});
+            if (node.driver >= edges_ || lies_at(scene_.edges[node.driver], f, node.field))
+                held.push_back({f, node.axis, node.driver});
         }
 }
 
@@ -210,4 +217,4 @@ Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacem
     return sum / length;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

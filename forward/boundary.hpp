@@ -9,14 +9,14 @@ namespace crampfit {
 /// What edges and bodies prescribe on the grid's fields. A driver is an edge or a body: the edges first, then the bodies.
 class Boundary {
   public:
-    struct Held {      // a displacement component of a field that an edge or a bonded body prescribes
+    struct Held {  // a displacement component of a field that an edge or a bonded body prescribes
         int field;
         int axis;
         int driver;
     };
     struct Traction {  // a force on a piece of the outline
         Facet facet;
-        Vec2 force;    // [N]
+        Vec2 force;  // [N]
         int driver;
     };
 
@@ -29,14 +29,14 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a crack
-    /// that runs alongside the edge does not, and moves freely.
+    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a
+    /// crack that runs alongside the edge does not, and moves freely.
     void hold_further_fields(const CrackFields& cracks);
 
-    Vec2 velocity_of(int driver) const;                // while it moves [m/s]
-    double travel_time(int driver) const;              // it stops then [s]; infinite: never
-    Vec2 travel(int driver, double time) const;        // how far it has gone, where it is prescribed [m]
-    bool has_dead_load() const;                        // a traction, or a force on a body, which do not go with time
+    Vec2 velocity_of(int driver) const;          // while it moves [m/s]
+    double travel_time(int driver) const;        // it stops then [s]; infinite: never
+    Vec2 travel(int driver, double time) const;  // how far it has gone, where it is prescribed [m]
+    bool has_dead_load() const;                  // a traction, or a force on a body, which do not go with time
 
     /// How far a driver has gone, prescribed or, under traction, on average over its facets [m].
     Vec2 moved(int driver, double time, const std::vector<Vec2>& displacement) const;
@@ -59,10 +59,10 @@ class Boundary {
 struct Gauges {
     explicit Gauges(const Scene& scene);
 
-    int force = 0;                 // driver
-    int displacement = 0;          // driver
-    Vec2 force_direction;          // unit; zero: nothing is driven
-    Vec2 displacement_direction;   // unit; zero: nothing is driven
+    int force = 0;                // driver
+    int displacement = 0;         // driver
+    Vec2 force_direction;         // unit; zero: nothing is driven
+    Vec2 displacement_direction;  // unit; zero: nothing is driven
 };
 
 /// Mass of each field [kg]; 0 for fields that no point belongs to.
@@ -76,4 +76,4 @@ inline double shared_tie(const FieldPair& pair, const std::vector<double>& mass)
     return left > 0.0 && right > 0.0 ? 4.0 * left * right / ((left + right) * (left + right)) * pair.tie : 0.0;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

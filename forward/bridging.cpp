@@ -19,7 +19,7 @@ double opening_of(const FieldPair& pair, const std::vector<Vec2>& displacement) 
     return (displacement[pair.left] - displacement[pair.right]).dot(pair.normal);
 }
 
-} // namespace
+}  // namespace
 
 BridgeState bridge_state(const Bridging& law, double steepest, double largest, double opening) {
     const double now = std::clamp(opening, 0.0, largest);
@@ -35,8 +35,8 @@ BridgeState bridge_state(const Bridging& law, double steepest, double largest, d
     return state;
 }
 
-BridgedFaces::BridgedFaces(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const std::vector<double>& mass,
-                           double most_frequency_squared)
+BridgedFaces::BridgedFaces(const Scene& scene, const Discretisation& body, const CrackFields& cracks,
+                           const std::vector<double>& mass, double most_frequency_squared)
     : scene_(scene), body_(body), most_frequency_squared_(most_frequency_squared), bridges_(cracks.pairs.size()) {
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
         if (scene.cracks[k].faces.bridging && scene.cracks[k].faces.bridging->on_all_faces) bridge_notch(k, cracks, mass);
@@ -44,11 +44,12 @@ BridgedFaces::BridgedFaces(const Scene& scene, const Discretisation& body, const
 }
 
 bool BridgedFaces::are_in(const Scene& scene) {
-    return std::any_of(scene.cracks.begin(), scene.cracks.end(), [](const Crack& crack) { return crack.faces.bridging.has_value(); });
+    return std::any_of(scene.cracks.begin(), scene.cracks.end(),
+                       [](const Crack& crack) { return crack.faces.bridging.has_value(); });
 }
 
-// Each place on the crack goes to the pairs of its cell by their shape functions; a pair that the tip has begun to free is bridged as a
-// whole, as those are that it comes to later.
+// Each place on the crack goes to the pairs of its cell by their shape functions; a pair that the tip has begun to free is
+// bridged as a whole, as those are that it comes to later.
 void BridgedFaces::bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass) {
     const Layout& layout = body_.layout;
     const auto& points = cracks.lines[crack].points;
@@ -87,15 +88,16 @@ bool BridgedFaces::is_cut(int node, const Vec2& on_crack, const Vec2& along) con
     bool left = false, right = false;
     body_.for_cells_in(layout.support(node), [&](int c) {
         const auto nodes = layout.cell_nodes(c);
-        if (std::find(nodes.begin(), nodes.begin() + layout.nodes_per_cell(), node) == nodes.begin() + layout.nodes_per_cell()) return;
+        if (std::find(nodes.begin(), nodes.begin() + layout.nodes_per_cell(), node) == nodes.begin() + layout.nodes_per_cell())
+            return;
         for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p)
             (cross(along, body_.points.position[p] - on_crack) >= 0.0 ? left : right) = true;
     });
     return left && right;
 }
 
-// The faces of a pair that a tip is about to free, were the crack straight about it [m^2]. As above, but pairs farther ahead are not
-// there yet.
+// The faces of a pair that a tip is about to free, were the crack straight about it [m^2]. As above, but pairs farther ahead are
+// not there yet.
 double BridgedFaces::area_ahead(const CrackFields& cracks, const FieldPair& pair) const {
     const Layout& layout = body_.layout;
     const bool at_end = TipTies::is_of(cracks, pair, pair.crack, true);
@@ -158,7 +160,8 @@ BridgeState BridgedFaces::state(const CrackFields& cracks, std::size_t k, const 
     const FieldPair& pair = cracks.pairs[k];
     const Bridge& bridge = bridges_[k];
     const double opening = opening_of(pair, displacement);
-    return bridge_state(*scene_.cracks[pair.crack].faces.bridging, bridge.stiffest / bridge.area, std::max(bridge.largest, opening), opening);
+    return bridge_state(*scene_.cracks[pair.crack].faces.bridging, bridge.stiffest / bridge.area,
+                        std::max(bridge.largest, opening), opening);
 }
 
 void BridgedFaces::pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
@@ -187,4 +190,4 @@ BridgedFaces::Energies BridgedFaces::energies(const CrackFields& cracks, const s
     return sum;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

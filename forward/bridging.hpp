@@ -13,15 +13,16 @@ struct BridgeState {
     double dissipated;  // [J/m^2]
 };
 
-/// Of faces that have been open by `largest` and are by `opening` now [m]. They give way by `steepest` at most [Pa/m]: below the opening
-/// where the law of `Bridging` would be steeper they hold on to what they carry, as faces do that have not opened yet.
+/// Of faces that have been open by `largest` and are by `opening` now [m]. They give way by `steepest` at most [Pa/m]: below the
+/// opening where the law of `Bridging` would be steeper they hold on to what they carry, as faces do that have not opened yet.
 BridgeState bridge_state(const Bridging& law, double steepest, double largest, double opening);
 
-/// Bridged crack faces in motion. Each pair of fields carries the traction on a part of the crack's faces, by its own jump along the
-/// normal: that part of the crack's length on which its shape function stands for the jump. Faces that have not opened are rigid: the
-/// whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a tip comes to is bridged before the tip
-/// frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by the bridges. Where the faces of
-/// the start are not bridged nor are pairs that the tip has begun to free by then: growth begins at the toughness of the tip.
+/// Bridged crack faces in motion. Each pair of fields carries the traction on a part of the crack's faces, by its own jump along
+/// the normal: that part of the crack's length on which its shape function stands for the jump. Faces that have not opened are
+/// rigid: the whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a tip comes to is
+/// bridged before the tip frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by
+/// the bridges. Where the faces of the start are not bridged nor are pairs that the tip has begun to free by then: growth begins
+/// at the toughness of the tip.
 class BridgedFaces {
   public:
     /// Bridges may add as much to the squared frequency of a pair that the tip has freed [1/s^2].
@@ -30,9 +31,9 @@ class BridgedFaces {
 
     static bool are_in(const Scene& scene);
 
-    /// What the compliance of ties at the pairs that a tip has just come to must be multiplied by, beyond `softness` of TipPatch. With
-    /// c the compliance of a free pair and k the slope of its softening bridges it opens as one of 1 / c - k; the tie of CrackFields for
-    /// that one lets the energy go linearly with the tip again.
+    /// What the compliance of ties at the pairs that a tip has just come to must be multiplied by, beyond `softness` of TipPatch.
+    /// With c the compliance of a free pair and k the slope of its softening bridges it opens as one of 1 / c - k; the tie of
+    /// CrackFields for that one lets the energy go linearly with the tip again.
     double softer_ties(const CrackFields& cracks, double softness) const;
 
     /// After a tip has moved or masses have changed.
@@ -63,9 +64,9 @@ class BridgedFaces {
 
     const Scene& scene_;
     const Discretisation& body_;
-    double most_frequency_squared_;   // [1/s^2]
-    std::vector<Bridge> bridges_;     // [pairs]
-    std::vector<std::size_t> live_;   // of them those that have faces
+    double most_frequency_squared_;  // [1/s^2]
+    std::vector<Bridge> bridges_;    // [pairs]
+    std::vector<std::size_t> live_;  // of them those that have faces
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -12,4 +12,4 @@ void check_bridging(const Scene& scene, bool quasistatic, const MaterialMap& mat
 /// For `crampfit explain`.
 std::vector<Plan::Choice> bridging_choices(const Scene& scene, const MaterialMap& materials, const Discretisation& body);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -15,8 +15,8 @@ namespace {
 constexpr int explicit_steps_between_searches = 50;
 constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
 
-// Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets the
-// time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
+// Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets
+// the time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
 constexpr double stiffness_in_cells = 10.0;
 
 // Width of the surface with whose mean a facet goes under a round body, and the most of it in radii: the mean of a wheel's own
@@ -25,12 +25,14 @@ constexpr double stiffness_in_cells = 10.0;
 // cells 4.6 %. Chosen by that, as is where the mean ends.
 constexpr double width_in_cells = 1.0;
 constexpr double width_in_radii = 0.2;
-constexpr double most_radius_in_cells = 16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
+constexpr double most_radius_in_cells =
+    16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
 
-// Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a touch
-// coming; from there on it grows evenly.
+// Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a
+// touch coming; from there on it grows evenly.
 constexpr double onset_in_cells = 0.0003;
-constexpr double at_touch = 0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
+constexpr double at_touch =
+    0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
 
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
@@ -74,7 +76,7 @@ double signed_depth(const Shape& shape, const Vec2& x) {
     return inside(shape, x) ? distance : -distance;
 }
 
-} // namespace
+}  // namespace
 
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
     : shape_(shape), body_(body), friction_(friction) {
@@ -187,7 +189,8 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
 }
 
 Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) const {
-    const auto kept = std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
+    const auto kept =
+        std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
     const bool is_kept = kept != grips_.end() && kept->place == touch.facet;
     const Vec2& before = place_[touch.facet];
     const double depth_before = is_kept ? 0.0 : std::min(0.0, signed_depth(shape_, before));
@@ -195,8 +198,8 @@ Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) c
                 stiffness_[touch.facet], is_kept ? *kept : Grip{});
 }
 
-// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a force
-// that falls evenly [J].
+// What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a
+// force that falls evenly [J].
 double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const {
     double energy = 0.0;
     auto touch = pushed_.begin();
@@ -222,10 +225,12 @@ void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacemen
     for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
     const auto keep = [&](int i) { place_[i] = current(i, displacement) - moved; };
     if (steps_between_searches_ > 1) std::for_each(near_.begin(), near_.end(), keep);
-    else for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
+    else
+        for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
 }
 
-void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement) {
+void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved,
+                          const std::vector<Vec2>& displacement) {
     if (friction_ == 0.0) return;
     grips_ = grips;
     dissipated_ = dissipated;
@@ -254,8 +259,8 @@ double SlidingBody::sunk_at(int facet) const {
     return (1.0 - place.share) * sunk_[place.station] + place.share * sunk_[place.station + 1];
 }
 
-// Finds how far s the wood yields beyond the grid: s = A P^T N(d - P s), with the depths d of the facets against the grid, their forces N and
-// their shares P of the stations. By Newton's method, with a part of its step where the whole one does no good.
+// Finds how far s the wood yields beyond the grid: s = A P^T N(d - P s), with the depths d of the facets against the grid, their
+// forces N and their shares P of the stations. By Newton's method, with a part of its step where the whole one does no good.
 void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement) {
     constexpr int most_iterations = 60, most_halvings = 8;
     constexpr double tolerance_in_cells = 1e-12;
@@ -267,7 +272,8 @@ void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement)
     };
     std::vector<Met> met;
     for (const int i : near_)
-        if (yield_->holds(i)) met.push_back({yield_->place(i), stiffness_[i], signed_depth(shape_, current(i, displacement) - moved)});
+        if (yield_->holds(i))
+            met.push_back({yield_->place(i), stiffness_[i], signed_depth(shape_, current(i, displacement) - moved)});
     sunk_ = Eigen::VectorXd::Zero(yield.rows());
     Eigen::VectorXd force;
     Eigen::MatrixXd stiffness;
@@ -348,4 +354,4 @@ Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement,
     return total;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

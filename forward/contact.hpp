@@ -13,12 +13,13 @@ namespace crampfit {
 class LocalYield;
 
 /// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
-/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each facet
-/// that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
+/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each
+/// facet that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
 ///
-/// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of a crack:
-/// displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and fro as it
-/// rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells across.
+/// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of
+/// a crack: displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and
+/// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
+/// across.
 class SlidingBody {
   public:
     SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
@@ -27,7 +28,8 @@ class SlidingBody {
     /// of these masses [kg]. From then on the facets that the body may touch are searched for now and then only.
     void limit_frequency(const std::vector<double>& mass, double most_frequency_squared);
 
-    /// From now on the wood yields by so much more than the grid, with springs as stiff for the finer cells that say so. Of circles alone.
+    /// From now on the wood yields by so much more than the grid, with springs as stiff for the finer cells that say so. Of
+    /// circles alone.
     void let_yield(std::shared_ptr<LocalYield> yield);
     LocalYield* yield() const { return yield_.get(); }  // null: it does not
     bool is_round() const { return width_ > 0.0; }      // and no more than some cells across
@@ -55,9 +57,11 @@ class SlidingBody {
         int point;
         std::array<double, most_nodes> weight;
     };
-    std::span<const Hold> holds(int facet) const { return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]}; }
+    std::span<const Hold> holds(int facet) const {
+        return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]};
+    }
 
-    double stored_energy() const { return stored_energy_; }  // in the contact's springs at the last push [J]
+    double stored_energy() const { return stored_energy_; }           // in the contact's springs at the last push [J]
     double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
 
     /// Keeps the last push as what friction counts from.
@@ -94,16 +98,16 @@ class SlidingBody {
 
     // Of wood that yields by more than the grid:
     std::shared_ptr<LocalYield> yield_;
-    Eigen::VectorXd sunk_;           // [stations] by how much more, at the last touches [m]
-    double yield_energy_ = 0.0;      // that this took [J]
+    Eigen::VectorXd sunk_;       // [stations] by how much more, at the last touches [m]
+    double yield_energy_ = 0.0;  // that this took [J]
 
     // Friction:
-    double friction_;                // coefficient; 0: none, and nothing below is there
-    std::vector<Vec2> place_;        // [facets] against the body when it was kept [m]
-    std::vector<Grip> grips_;        // of the facets that touched then, by facet
-    std::vector<Touch> pushed_;      // the last push
-    double dissipated_ = 0.0;        // until then [J]
-    double sliding_now_ = 0.0;       // by the last push since then [J]
+    double friction_;            // coefficient; 0: none, and nothing below is there
+    std::vector<Vec2> place_;    // [facets] against the body when it was kept [m]
+    std::vector<Grip> grips_;    // of the facets that touched then, by facet
+    std::vector<Touch> pushed_;  // the last push
+    double dissipated_ = 0.0;    // until then [J]
+    double sliding_now_ = 0.0;   // by the last push since then [J]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

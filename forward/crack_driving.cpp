@@ -17,7 +17,8 @@ double length_of(const std::vector<Vec2>& route) {
     return length;
 }
 
-// Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the energies.
+// Sums over states with weights, for all that a state holds; K and opening are linear in the load, G is quadratic like the
+// energies.
 LoadState weighted(const std::vector<const LoadState*>& states, const std::vector<double>& weights) {
     LoadState sum;
     sum.reactions.assign(states[0]->reactions.size(), Vec2::Zero());
@@ -62,7 +63,7 @@ double cubic(double from, double slope_from, double to, double slope_to, double 
     return from * (1.0 + 2.0 * s) * r * r + slope_from * s * r * r + to * s * s * (3.0 - 2.0 * s) - slope_to * s * s * r;
 }
 
-} // namespace
+}  // namespace
 
 LoadState scaled(const LoadState& state, double factor) {
     LoadState at = state;
@@ -195,7 +196,8 @@ double Station::critical_time(double toughness, bool beyond) const {
         const double ratio = (excess[other] + needed) / released;
         double power = 2.0;
         if (finite_advance) power = slope[start] * time[start] / released;
-        else if (ratio > 0.0 && time[other] > 0.0 && other != start) power = std::log(ratio) / std::log(time[other] / time[start]);
+        else if (ratio > 0.0 && time[other] > 0.0 && other != start)
+            power = std::log(ratio) / std::log(time[other] / time[start]);
         return time[start] * std::pow(needed / released, 1.0 / std::max(power, 0.5));
     };
     if (beyond && excess.back() < 0.0) {
@@ -235,4 +237,4 @@ double Station::critical_time(double toughness, bool beyond) const {
     return found <= still_from * (1.0 + 1e-12) ? found : never;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -17,8 +17,8 @@ namespace {
 constexpr double pair_compliance = 4.2;
 
 // A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip
-// field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against the
-// exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
+// field, so that the crack of a grid ends behind the tip. Known from G of centre cracks at 0 to 45 degrees to the grid against
+// the exact value, at 5 to 40 cells per half crack, where the error is this shift alone (`VerificationTurnedCrack`).
 constexpr double tip_lag_of_hats = 0.25;
 constexpr double tip_lag_of_splines = 0.37;
 
@@ -56,7 +56,7 @@ bool lies_beyond(double distance, const Vec2& from, const Vec2& to, const Vec2& 
     return (from.cwiseMin(to) - x).maxCoeff() > distance || (x - from.cwiseMax(to)).maxCoeff() > distance;
 }
 
-} // namespace
+}  // namespace
 
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) {
     // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
@@ -114,10 +114,10 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
         CrackLine line;
         line.points = crack.points;
         const std::size_t last = crack.points.size() - 1;
-        line.start = {crack.grows == Growth::start || crack.grows == Growth::both, is_inside(crack.points[0]),
-                      crack.points[0], (crack.points[0] - crack.points[1]).normalized()};
-        line.end = {crack.grows == Growth::end || crack.grows == Growth::both, is_inside(crack.points[last]),
-                    crack.points[last], (crack.points[last] - crack.points[last - 1]).normalized()};
+        line.start = {crack.grows == Growth::start || crack.grows == Growth::both, is_inside(crack.points[0]), crack.points[0],
+                      (crack.points[0] - crack.points[1]).normalized()};
+        line.end = {crack.grows == Growth::end || crack.grows == Growth::both, is_inside(crack.points[last]), crack.points[last],
+                    (crack.points[last] - crack.points[last - 1]).normalized()};
         line.length = length_inside(line.points, {Vec2::Zero(), body.layout.size()});
         lines.push_back(line);
     }
@@ -154,7 +154,8 @@ bool CrackFields::is_left(int crack, const Vec2& x) const {
     const double rounding = 1e-9 * body_->layout.cell.minCoeff();  // a node on the crack counts as left of it
     double nearest = std::numeric_limits<double>::infinity();
     double side = 0.0;
-    const double reach = std::sqrt(std::min((x - points.front()).squaredNorm(), (x - points.back()).squaredNorm())) + 2.0 * rounding;
+    const double reach =
+        std::sqrt(std::min((x - points.front()).squaredNorm(), (x - points.back()).squaredNorm())) + 2.0 * rounding;
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
         const bool at_an_end = k == 0 || k + 2 == points.size();
         if (!at_an_end && lies_beyond(reach, points[k], points[k + 1], x)) continue;
@@ -235,8 +236,8 @@ bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
     return false;
 }
 
-// Whether the straight way on from a tip that has come out of the wood meets wood again within a distance: the flanks of a notch lie
-// beside it, and it has to keep them apart.
+// Whether the straight way on from a tip that has come out of the wood meets wood again within a distance: the flanks of a notch
+// lie beside it, and it has to keep them apart.
 bool CrackFields::wood_lies_ahead(const CrackTip& tip, double distance) const {
     const double cell = body_->layout.cell.minCoeff();
     const Box specimen{Vec2::Zero(), body_->layout.size()};
@@ -342,7 +343,8 @@ void CrackFields::renew_ties(int crack) {
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
         const double now = freed(crack, pair.node);
-        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come to.
+        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come
+        // to.
         if (pair.freed < 1.0 || now <= 0.0) pair.freed = now;
         const double f = std::max({least_freed_, pair.freed, smallest});
         pair.tie = (1.0 - f) / (f * pair.compliance);
@@ -427,4 +429,4 @@ Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& dis
     return jump;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

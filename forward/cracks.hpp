@@ -11,10 +11,10 @@ namespace crampfit {
 /// One end of a crack.
 struct CrackTip {
     bool grows = false;
-    bool inside = false;     // the tip lies in the material; a crack that starts on a side, or on another crack, has one tip only
-    Vec2 position;           // undeformed [m]
-    Vec2 direction;          // unit, ahead
-    int wall = -1;           // another crack into whose face this one has run: wood beyond it does not feel this crack
+    bool inside = false;  // the tip lies in the material; a crack that starts on a side, or on another crack, has one tip only
+    Vec2 position;        // undeformed [m]
+    Vec2 direction;       // unit, ahead
+    int wall = -1;        // another crack into whose face this one has run: wood beyond it does not feel this crack
     bool wall_on_left = false;  // of the wall, seen from its start: the side where this crack lies
 };
 
@@ -23,7 +23,7 @@ struct CrackLine {
     std::vector<Vec2> points;  // [m]
     CrackTip start;
     CrackTip end;
-    double length = 0.0;       // of the part inside the specimen's rectangle [m]
+    double length = 0.0;  // of the part inside the specimen's rectangle [m]
 
     CrackTip& tip(bool at_end) { return at_end ? end : start; }
     const CrackTip& tip(bool at_end) const { return at_end ? end : start; }
@@ -36,18 +36,18 @@ struct CrackLine {
 
 /// Two fields of one node, on either side of a crack.
 struct FieldPair {
-    int left;         // field on the left of the crack, seen from start to end
-    int right;        // field on the right
-    int with_node;    // that of the two whose wood lies on the node's side of the crack
-    int node;         // where they are
+    int left;       // field on the left of the crack, seen from start to end
+    int right;      // field on the right
+    int with_node;  // that of the two whose wood lies on the node's side of the crack
+    int node;       // where they are
     int crack;
-    Vec2 normal;      // unit, from right to left
+    Vec2 normal;           // unit, from right to left
     Vec2 freed_at;         // where the tip is when it frees the pair
     Vec2 along;            // unit, the way that it goes
     double plane_modulus;  // E' of the wood there [Pa]
     double compliance;     // of the pair when it is free [m/N]
     double freed;          // share of the way past the pair that the tip has gone; 1: the crack has cut the node's whole support
-    double tie;       // stiffness that still holds the pair together [N/m]; 0 once the pair is free
+    double tie;            // stiffness that still holds the pair together [N/m]; 0 once the pair is free
 };
 
 /// Share of its way past a node, over the width of a cell, that a tip has gone: below 0 before, above 1 after.
@@ -102,7 +102,7 @@ class CrackFields {
 
   private:
     struct Meeting {
-        Vec2 at;   // [m]
+        Vec2 at;  // [m]
         int crack;
     };
     std::optional<Meeting> meeting(int crack, const Vec2& from, const Vec2& to, double near) const;
@@ -121,9 +121,9 @@ class CrackFields {
     Discretisation* body_;
     const MaterialMap* materials_;
     double least_freed_;
-    PointTable<std::uint8_t> mask_;      // [points] bit k: crack k lies between the point and the cell's node
+    PointTable<std::uint8_t> mask_;                     // [points] bit k: crack k lies between the point and the cell's node
     std::map<std::pair<int, unsigned>, int> field_of_;  // node and mask to field, for masks above 0
     std::vector<NewField> new_fields_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

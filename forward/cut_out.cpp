@@ -38,7 +38,7 @@ std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
     return {points.begin() + static_cast<std::ptrdiff_t>(first), points.begin() + static_cast<std::ptrdiff_t>(last) + 2};
 }
 
-} // namespace
+}  // namespace
 
 int GridView::point_beside(const Vec2& x) const {
     const bool left = cracks.is_left(crack, x);
@@ -156,7 +156,8 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
     return true;
 }
 
-std::vector<Vec2> CutOut::slope_by(const GridView& from, const std::vector<Vec2>& inner, double sign, std::vector<double>& by_number) {
+std::vector<Vec2> CutOut::slope_by(const GridView& from, const std::vector<Vec2>& inner, double sign,
+                                   std::vector<double>& by_number) {
     const std::vector<MaterialSlope>& numbers = wood_->slopes_by(numbers_);
     const Equilibrium::Slopes slopes = equilibrium_->slopes(numbers);
     for (std::size_t n = 0; n < numbers.size(); ++n) by_number[n] += sign * slopes.potential[n];
@@ -174,4 +175,4 @@ std::vector<Vec2> CutOut::slope_by(const GridView& from, const std::vector<Vec2>
     return slope;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

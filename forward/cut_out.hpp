@@ -29,17 +29,17 @@ struct CutOutWood {
     }
     const std::vector<MaterialSlope>& slopes_by(const std::vector<MaterialSlope>& numbers);
 
-    Box box;                               // in the specimen
-    Scene scene;                           // of what is cut out; its outline is held where the specimen goes on
+    Box box;      // in the specimen
+    Scene scene;  // of what is cut out; its outline is held where the specimen goes on
     MaterialMap materials;
     Discretisation body;
 
   private:
-    std::vector<MaterialSlope> slopes_;    // of the numbers here; empty: not asked for yet
+    std::vector<MaterialSlope> slopes_;  // of the numbers here; empty: not asked for yet
 };
 
-/// A box cut out of the specimen with one of its cracks; its outline is held where another grid has it. A crack that goes on takes along
-/// what it leaves as it is: its fields and most of the factor.
+/// A box cut out of the specimen with one of its cracks; its outline is held where another grid has it. A crack that goes on
+/// takes along what it leaves as it is: its fields and most of the factor.
 class CutOut {
   public:
     /// `whole`, `plan` and `numbers`, those of the materials by which slopes may be asked for, must outlive this.
@@ -47,11 +47,12 @@ class CutOut {
 
     const std::shared_ptr<CutOutWood>& wood() const { return wood_; }
 
-    /// Where the tip goes from the crack that was solved for last to this one [m]: nowhere if that is the same. None where it is another.
+    /// Where the tip goes from the crack that was solved for last to this one [m]: nowhere if that is the same. None where it is
+    /// another.
     std::optional<std::vector<Vec2>> way_to(const CrackLine& line, int crack, bool at_end) const;
 
-    /// Solves with this crack. False where the other grid does not know the outline. `solved_there`: in the same cells, so that what the
-    /// other grid has there is the solution.
+    /// Solves with this crack. False where the other grid does not know the outline. `solved_there`: in the same cells, so that
+    /// what the other grid has there is the solution.
     bool solve(const CrackLine& line, int crack, bool at_end, const GridView& from, bool solved_there);
 
     double potential() const { return equilibrium_->potential(); }  // [J]
@@ -74,13 +75,13 @@ class CutOut {
     const Plan& plan_;
     const std::vector<MaterialSlope>& numbers_;
     std::shared_ptr<CutOutWood> wood_;
-    Scene scene_;                          // with the crack
+    Scene scene_;  // with the crack
     Discretisation cracked_;
     std::optional<Equilibrium> equilibrium_;
-    int crack_ = -1;                       // that it holds, by its number in the specimen; -1: none yet
-    std::vector<Vec2> points_;             // of that crack, in the specimen [m]
-    std::vector<Hold> taken_;              // the outline, or all that is solved there
+    int crack_ = -1;            // that it holds, by its number in the specimen; -1: none yet
+    std::vector<Vec2> points_;  // of that crack, in the specimen [m]
+    std::vector<Hold> taken_;   // the outline, or all that is solved there
     bool solved_there_ = false;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

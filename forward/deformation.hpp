@@ -11,10 +11,10 @@ using Mat2 = Eigen::Matrix2d;
 
 /// Stress and energy of a point. `stress` is the first Piola-Kirchhoff stress: force on the undeformed area.
 struct PointState {
-    Mat2 gradient;       // displacement gradient, du_i / dX_j
+    Mat2 gradient;  // displacement gradient, du_i / dX_j
     Mat2 strain;
-    Mat2 stress;         // [Pa]
-    double energy;       // per undeformed volume [J/m^3]
+    Mat2 stress;    // [Pa]
+    double energy;  // per undeformed volume [J/m^3]
 };
 
 /// The polar decomposition F = R U in the plane: R is along (F11 + F22, F21 - F12).
@@ -36,16 +36,14 @@ struct Polar {
     Eigen::Matrix<double, 3, 4> strain_slope() const {
         const Mat2 u = stretch / trace;
         Eigen::Matrix<double, 3, 4> B;
-        B << 1, -u(0, 1), u(0, 1), 0,
-             0, u(0, 1), -u(0, 1), 1,
-             0, 2 * u(0, 0), 2 * u(1, 1), 0;
+        B << 1, -u(0, 1), u(0, 1), 0, 0, u(0, 1), -u(0, 1), 1, 0, 2 * u(0, 0), 2 * u(1, 1), 0;
         return B;
     }
 };
 
-/// What a point is in whose stress xx, yy, xy is `stress_of` its strain xx, yy, 2 xy. With `rotates` these are Biot's strain U - I and its
-/// stress in the frame that turns with the point (F = R U): no stress from rotation alone. Without, the strain is small. The energy is
-/// that of a straight line from no stress to this.
+/// What a point is in whose stress xx, yy, xy is `stress_of` its strain xx, yy, 2 xy. With `rotates` these are Biot's strain U -
+/// I and its stress in the frame that turns with the point (F = R U): no stress from rotation alone. Without, the strain is
+/// small. The energy is that of a straight line from no stress to this.
 template <class Stress>
 PointState state_with(const Mat2& gradient, bool rotates, const Stress& stress_of) {
     PointState state;
@@ -74,12 +72,13 @@ inline PointState elastic_state(const Mat2& gradient, const Eigen::Matrix3d& sti
     return state_with(gradient, rotates, [&](const Eigen::Vector3d& strain) -> Eigen::Vector3d { return stiffness * strain; });
 }
 
-/// Derivative of the stress of `state_with` by the displacement gradient, counted xx, xy, yx, yy [Pa], where that of `stress_of` (xx, yy,
-/// xy of strain xx, yy, 2 xy) is C; without `geometric` only the part that is never negative, which leaves out that stress turns with
-/// the point. Numbers are `double`, or arrays of them for many points at once. C is counted xx-xx, xx-yy, yy-yy, xy-xy, xx-xy, yy-xy.
+/// Derivative of the stress of `state_with` by the displacement gradient, counted xx, xy, yx, yy [Pa], where that of `stress_of`
+/// (xx, yy, xy of strain xx, yy, 2 xy) is C; without `geometric` only the part that is never negative, which leaves out that
+/// stress turns with the point. Numbers are `double`, or arrays of them for many points at once. C is counted xx-xx, xx-yy,
+/// yy-yy, xy-xy, xx-xy, yy-xy.
 template <class Number, class Stress>
-std::array<std::array<Number, 4>, 4> tangent_with(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, const Stress& stress_of,
-                                                  bool rotates, bool geometric) {
+std::array<std::array<Number, 4>, 4> tangent_with(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C,
+                                                  const Stress& stress_of, bool rotates, bool geometric) {
     using std::sqrt;
     std::array<std::array<Number, 4>, 4> A;
     if (!rotates) {
@@ -143,8 +142,8 @@ std::array<std::array<Number, 4>, 4> tangent_with(const std::array<Number, 4>& g
 
 /// Second derivative of the energy of `elastic_state`.
 template <class Number>
-std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C, bool rotates,
-                                                     bool geometric) {
+std::array<std::array<Number, 4>, 4> elastic_tangent(const std::array<Number, 4>& gradient, const std::array<Number, 6>& C,
+                                                     bool rotates, bool geometric) {
     const auto stress = [&](const Number& xx, const Number& yy, const Number& shear) {
         return std::array<Number, 3>{C[0] * xx + C[1] * yy + C[4] * shear, C[1] * xx + C[2] * yy + C[5] * shear,
                                      C[4] * xx + C[5] * yy + C[3] * shear};
@@ -173,4 +172,4 @@ inline Vec2 value_at(const Discretisation& body, int p, const std::vector<Vec2>&
     return value;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -59,10 +59,12 @@ class Extent {
 };
 
 int part_at(const std::vector<Part>& parts, const Vec2& x) {
-    const auto distance = [&](const Part& part) { return inside(part.shape, x) ? 0.0 : nearest_on_outline(part.shape, x).distance; };
-    return static_cast<int>(std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) {
-                                return distance(a) < distance(b);
-                            }) - parts.begin());
+    const auto distance = [&](const Part& part) {
+        return inside(part.shape, x) ? 0.0 : nearest_on_outline(part.shape, x).distance;
+    };
+    return static_cast<int>(
+        std::min_element(parts.begin(), parts.end(), [&](const Part& a, const Part& b) { return distance(a) < distance(b); }) -
+        parts.begin());
 }
 
 // Stress zz per stress xx, yy, xy in plane strain.
@@ -73,7 +75,7 @@ Eigen::Vector3d stress_out_of_plane(const LocalWood& wood) {
             2.0 * (across - along) * n.x() * n.y()};
 }
 
-} // namespace
+}  // namespace
 
 Layout Layout::of(const Scene& scene) {
     if (!(scene.model.cell > 0.0))
@@ -109,7 +111,7 @@ constexpr int kinds_of_cells = 4;
 int kind_of_cell(int i, int cells) { return (i == 0 ? 1 : 0) + (i == cells - 1 ? 2 : 0); }
 CellEnds ends_of_kind(int kind) { return {(kind & 1) != 0, (kind & 2) != 0}; }
 
-} // namespace
+}  // namespace
 
 Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials) : layout(Layout::of(scene)) {
     const ShapeFunction kind = scene.solver.shape_function;
@@ -166,20 +168,23 @@ Change Discretisation::change_between(int p, int other) const {
     // changes them by the square of its turn within the cell, which is no other wood.
     constexpr double no_other_wood = 0.01;
     const Eigen::Matrix3d here = points.stiffness_of(p), there = points.stiffness_of(other);
-    const double bulk = here(0, 0) + here(1, 1) + 2.0 * here(0, 1), shear = here(0, 0) + here(1, 1) - 2.0 * here(0, 1) + 4.0 * here(2, 2);
+    const double bulk = here(0, 0) + here(1, 1) + 2.0 * here(0, 1),
+                 shear = here(0, 0) + here(1, 1) - 2.0 * here(0, 1) + 4.0 * here(2, 2);
     const double other_bulk = there(0, 0) + there(1, 1) + 2.0 * there(0, 1);
     const double other_shear = there(0, 0) + there(1, 1) - 2.0 * there(0, 1) + 4.0 * there(2, 2);
-    if (std::abs(other_bulk - bulk) > no_other_wood * bulk || std::abs(other_shear - shear) > no_other_wood * shear) return Change::wood;
+    if (std::abs(other_bulk - bulk) > no_other_wood * bulk || std::abs(other_shear - shear) > no_other_wood * shear)
+        return Change::wood;
     return (there - here).norm() > rounding * here.norm() ? Change::grain : Change::none;
 }
 
-// Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point, and layers
-// that share it would act too stiff across. Where in the cell each wood lies is told apart (`uneven_cells`).
+// Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point, and
+// layers that share it would act too stiff across. Where in the cell each wood lies is told apart (`uneven_cells`).
 LocalWood Discretisation::wood_of_cell(const MaterialMap& materials, int c) const {
     return materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
 }
 
-Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box, const LocalWood& average) const {
+Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box,
+                                         const LocalWood& average) const {
     const Vec2 wide(box.to_x - box.from_x, box.to_y - box.from_y);
     const Vec2 half = 0.5 * wide.cwiseProduct(layout.point_size());
     const Vec2 centre = layout.cell_corner(c) + layout.point_size().cwiseProduct(Vec2(box.from_x, box.from_y)) + half;
@@ -202,7 +207,8 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         const Eigen::Matrix3d C = wood.elasticity.stiffness();
         points.stiffness.push_back({C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)});
         const auto nodes = layout.cell_nodes(c);
-        const int kind = kind_of_cell(c % layout.cells_x, layout.cells_x) + kinds_of_cells * kind_of_cell(c / layout.cells_x, layout.cells_y);
+        const int kind =
+            kind_of_cell(c % layout.cells_x, layout.cells_x) + kinds_of_cells * kind_of_cell(c / layout.cells_x, layout.cells_y);
         const int first_slot = layout.degree == 1 ? 0 : kind * layout.points_per_cell();
         double filled = 0.0;
         for (int slot = 0; slot < layout.points_per_cell(); ++slot) {
@@ -217,7 +223,8 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
             points.cell.push_back(c);
             points.slot.push_back(static_cast<std::uint16_t>(first_slot + slot));
             points.node.add({nodes.data(), static_cast<std::size_t>(layout.nodes_per_cell())});
-            if (!materials.homogeneous() && !materials.orthotropic()) points.layers.push_back(wood.elasticity.coefficients.head<4>());
+            if (!materials.homogeneous() && !materials.orthotropic())
+                points.layers.push_back(wood.elasticity.coefficients.head<4>());
             points.volume.push_back(share * size.prod() * layout.thickness);
             points.mass.push_back(wood.density * points.volume.back());
             if (materials.orthotropic()) points.out_of_plane.push_back(stress_out_of_plane(wood));
@@ -241,8 +248,10 @@ void Discretisation::check_parts(const Scene& scene) const {
         for (const int node : points.node[p]) {
             int& known = part[node];
             if (known >= 0 && known != points.part[p])
-                throw InputError(scene.file.string(), "specimen.parts", std::to_string(known) + " and " + std::to_string(points.part[p]),
-                                 "two parts must lie " + std::to_string(layout.degree + 1) + " cells apart at the least, or make up one shape");
+                throw InputError(scene.file.string(), "specimen.parts",
+                                 std::to_string(known) + " and " + std::to_string(points.part[p]),
+                                 "two parts must lie " + std::to_string(layout.degree + 1) +
+                                     " cells apart at the least, or make up one shape");
             known = points.part[p];
         }
     }
@@ -262,4 +271,4 @@ int Discretisation::neighbour(int p, int step_x, int step_y) const {
     return point_at(points.position[p] + layout.point_size().cwiseProduct(Vec2(step_x, step_y)));
 }
 
-} // namespace crampfit
+}  // namespace crampfit

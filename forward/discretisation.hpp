@@ -15,14 +15,14 @@ namespace crampfit {
 
 /// How grid and points lie in the specimen. The grid fits the specimen exactly: the asked spacing is rounded, each way on its
 /// own, so that sides lie on grid lines. Cells and nodes are counted row by row from the lower left corner. Nodes are the cells'
-/// corners, or, for quadratic B-splines, the places where a line's coefficients are its values (Greville): the middles of cells, and
-/// the grid's ends.
+/// corners, or, for quadratic B-splines, the places where a line's coefficients are its values (Greville): the middles of cells,
+/// and the grid's ends.
 struct Layout {
     int cells_x = 0;
     int cells_y = 0;
-    int degree = 1;    // of the shape functions along an axis; 2: B-splines
-    int per_side = 0;  // points along one side of a cell
-    Vec2 cell;         // grid spacing in x and y [m]
+    int degree = 1;        // of the shape functions along an axis; 2: B-splines
+    int per_side = 0;      // points along one side of a cell
+    Vec2 cell;             // grid spacing in x and y [m]
     double thickness = 0;  // [m]
 
     static Layout of(const Scene& scene);
@@ -55,7 +55,9 @@ struct Layout {
 
   private:
     // In cells, of node i along an axis of so many cells.
-    double place_of_node(int i, int cells) const { return degree == 1 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(cells)); }
+    double place_of_node(int i, int cells) const {
+        return degree == 1 ? i : std::clamp(i - 0.5, 0.0, static_cast<double>(cells));
+    }
 };
 
 /// So many values a point, one row each.
@@ -87,21 +89,22 @@ struct PointBox {
 /// Material points in the undeformed specimen, in cell order: those of cell c are first_of_cell[c] .. first_of_cell[c + 1]. What
 /// a cutout takes of a point's domain is taken off its volume.
 struct Points {
-    std::vector<Vec2> position;              // middle of what is left of its domain [m]
+    std::vector<Vec2> position;  // middle of what is left of its domain [m]
     std::vector<int> cell;
-    std::vector<std::uint16_t> slot;         // which of the discretisation's `weights` are its own
-    PointTable<int> node;                    // the velocity fields it belongs to at the nodes that its cell sees
+    std::vector<std::uint16_t> slot;               // which of the discretisation's `weights` are its own
+    PointTable<int> node;                          // the velocity fields it belongs to at the nodes that its cell sees
     std::vector<std::array<double, 6>> stiffness;  // [cells] stress from strain: xx,xx; xx,yy; yy,yy; xy,xy; xx,xy; yy,xy [Pa]
-    std::vector<Eigen::Vector4d> layers;     // coefficients of LayeredElasticity; empty where all wood is the same or some orthotropic
-    std::vector<double> volume;              // [m^3]
-    std::vector<double> mass;                // [kg]
-    std::vector<double> poisson_ratio;       // for the stress out of the plane; empty where some wood is orthotropic
+    std::vector<Eigen::Vector4d>
+        layers;                         // coefficients of LayeredElasticity; empty where all wood is the same or some orthotropic
+    std::vector<double> volume;         // [m^3]
+    std::vector<double> mass;           // [kg]
+    std::vector<double> poisson_ratio;  // for the stress out of the plane; empty where some wood is orthotropic
     std::vector<Eigen::Vector3d> out_of_plane;  // there: stress zz per stress xx, yy, xy in plane strain
-    std::vector<float> latewood;             // 0..1, for pictures
-    std::vector<int> part;                   // of the specimen's parts; empty where it has none
-    std::vector<Change> changes;             // from a neighbouring point to this one; empty: nowhere
-    std::vector<int> first_of_cell;          // [cells + 1]
-    std::vector<int> lattice;                // [rows x columns of point places] point there, or -1
+    std::vector<float> latewood;                // 0..1, for pictures
+    std::vector<int> part;                      // of the specimen's parts; empty where it has none
+    std::vector<Change> changes;                // from a neighbouring point to this one; empty: nowhere
+    std::vector<int> first_of_cell;             // [cells + 1]
+    std::vector<int> lattice;                   // [rows x columns of point places] point there, or -1
 
     int count() const { return static_cast<int>(position.size()); }
     Eigen::Matrix3d stiffness_of(int p) const {
@@ -117,10 +120,10 @@ struct Points {
 /// A short piece of the specimen's surface: of its sides, or of a cutout's true outline and not of the staircase of the points.
 /// Together they are as long as the surface. It moves with the cell that it lies in, so that the surface stays in one piece.
 struct Facet {
-    int point;                     // of its cell, near it: knows the fields
-    Vec2 position;                 // its middle, undeformed [m]
-    double length;                 // [m]
-    Vec2 normal;                   // unit, out of the specimen
+    int point;                              // of its cell, near it: knows the fields
+    Vec2 position;                          // its middle, undeformed [m]
+    double length;                          // [m]
+    Vec2 normal;                            // unit, out of the specimen
     std::array<double, most_nodes> weight;  // of the nodes that the point's cell sees
 };
 
@@ -133,7 +136,8 @@ class Discretisation {
 
     Layout layout;
     Points points;
-    std::vector<CellWeights> weights;  // by slot: places in a cell row by row and, for B-splines, for each kind of cell (`cell_ends`)
+    std::vector<CellWeights>
+        weights;  // by slot: places in a cell row by row and, for B-splines, for each kind of cell (`cell_ends`)
     std::vector<CellWeights> corner_weights;  // linear, by place in a cell: of what is given at the cells' corners
     std::vector<Facet> facets;
     struct UnevenCell {
@@ -151,11 +155,12 @@ class Discretisation {
     int place_of(int p) const { return points.slot[p] % layout.points_per_cell(); }  // in its cell, row by row
     /// Shape functions of the nodes that a cell sees at x, which may lie outside the cell: they go on as they do in it.
     std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
-    bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
-    int point_at(const Vec2& x) const;                 // the point whose domain holds x, or -1
+    bool cell_is_full(int c) const { return cell_is_full_[c]; }         // nothing of it is cut out or void
+    int point_at(const Vec2& x) const;                                  // the point whose domain holds x, or -1
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;  // on average
-    Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box, const LocalWood& average) const;  // a piece of a full cell
-    int neighbour(int p, int step_x, int step_y) const;  // the point that many places away, or -1
+    Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box,
+                             const LocalWood& average) const;  // a piece of a full cell
+    int neighbour(int p, int step_x, int step_y) const;        // the point that many places away, or -1
 
     /// Calls `visit(c)` for every cell that a square of half width `reach` about x touches.
     template <class Visit>
@@ -186,4 +191,4 @@ class Discretisation {
     std::vector<bool> cell_is_full_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -29,13 +29,14 @@ Eigen::Matrix3d compliance_slope(const OrthotropicElasticity& wood, bool strain,
     if (constant == ElasticConstant::E_T) return compliance_of(0, -1.0 / (E_T * E_T), 0, 0);
     if (constant == ElasticConstant::G_RT) return compliance_of(0, 0, 0, -1.0 / (G_RT * G_RT));
     if (constant == ElasticConstant::nu_RT) return compliance_of(0, 0, -1.0 / E_R, 0);
-    if (strain && constant == ElasticConstant::E_L) return compliance_of(nu_LR * nu_LR, nu_LT * nu_LT, nu_LR * nu_LT, 0) / (E_L * E_L);
+    if (strain && constant == ElasticConstant::E_L)
+        return compliance_of(nu_LR * nu_LR, nu_LT * nu_LT, nu_LR * nu_LT, 0) / (E_L * E_L);
     if (strain && constant == ElasticConstant::nu_LR) return compliance_of(-2.0 * nu_LR, 0, -nu_LT, 0) / E_L;
     if (strain && constant == ElasticConstant::nu_LT) return compliance_of(0, -2.0 * nu_LT, -nu_LR, 0) / E_L;
     return Eigen::Matrix3d::Zero();
 }
 
-} // namespace
+}  // namespace
 
 Eigen::Matrix3d plane_compliance(const Material& material, PlaneCondition plane) {
     const bool strain = plane == PlaneCondition::strain;
@@ -51,7 +52,8 @@ Eigen::Matrix3d plane_compliance(const Material& material, PlaneCondition plane)
 }
 
 Eigen::Matrix3d plane_stiffness(const Material& material, PlaneCondition plane) {
-    if (!material.orthotropic) return layered(plane_elasticity(material.youngs_modulus, material.poisson_ratio, plane)).stiffness();
+    if (!material.orthotropic)
+        return layered(plane_elasticity(material.youngs_modulus, material.poisson_ratio, plane)).stiffness();
     return plane_compliance(material, plane).inverse();
 }
 
@@ -62,7 +64,8 @@ Eigen::Matrix3d plane_stiffness_slope(const Material& material, PlaneCondition p
     if (constant == ElasticConstant::E) return C / material.youngs_modulus;
     if (constant != ElasticConstant::nu) return Eigen::Matrix3d::Zero();
     const double nu = material.poisson_ratio;
-    const Eigen::Matrix3d slope = compliance_of(strain ? -2.0 * nu : 0.0, strain ? -2.0 * nu : 0.0, strain ? -1.0 - 2.0 * nu : -1.0, 2.0);
+    const Eigen::Matrix3d slope =
+        compliance_of(strain ? -2.0 * nu : 0.0, strain ? -2.0 * nu : 0.0, strain ? -1.0 - 2.0 * nu : -1.0, 2.0);
     return -C * slope * C / material.youngs_modulus;
 }
 
@@ -120,4 +123,4 @@ double rayleigh_speed(const Eigen::Matrix3d& stiffness, double density) {
     return std::sqrt(low / density);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

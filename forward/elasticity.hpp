@@ -4,8 +4,8 @@
 
 namespace crampfit {
 
-// Stiffness and compliance of the plane problem: 3 x 3, between stress xx, yy, xy and strain xx, yy, 2 xy. A material's own axes are
-// R, T; isotropic wood has no preferred ones.
+// Stiffness and compliance of the plane problem: 3 x 3, between stress xx, yy, xy and strain xx, yy, 2 xy. A material's own axes
+// are R, T; isotropic wood has no preferred ones.
 
 /// Elastic constants of isotropic wood as the plane problem needs them: stress_xx = lambda (e_xx + e_yy) + 2 mu e_xx.
 /// In plane strain lambda is Lame's; in plane stress it is 2 lambda mu / (lambda + 2 mu).
@@ -59,4 +59,4 @@ LayeredElasticity layered(const Eigen::Matrix3d& stiffness, const Vec2& normal);
 /// wood whose axes are x and y (Vinh and Ogden 2004, eq. 1); where they are not, the coupling of stretch and shear is left out.
 double rayleigh_speed(const Eigen::Matrix3d& stiffness, double density);
 
-} // namespace crampfit
+}  // namespace crampfit

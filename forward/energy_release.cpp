@@ -76,7 +76,7 @@ class WoodGradient {
 
   private:
     Eigen::Matrix<double, 6, 2> coefficients_ = Eigen::Matrix<double, 6, 2>::Zero();  // [per m]
-    Vec2 normal_ = Vec2::UnitX();  // in which the wood changes most
+    Vec2 normal_ = Vec2::UnitX();                                                     // in which the wood changes most
 };
 
 // The virtual extension at the corners of the grid's cells, and how far it reaches. It is linear between them, whatever the shape
@@ -114,7 +114,7 @@ class Extension {
         return std::clamp((outer - distance) / (outer - inner), 0.0, 1.0);
     }
 
-    Layout corners;                 // as nodes
+    Layout corners;  // as nodes
 
   private:
     // From the tip to the nearest point where the wood changes, as far as `reach` [m].
@@ -225,8 +225,8 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
     return Polar(sum / count).turn;
 }
 
-// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the
-// middle.
+// What the tractions on pressed faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q
+// in the middle.
 double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end,
                       const Extension& extension, const std::vector<Vec2>& displacement, double thickness) {
     const CrackLine& line = cracks.lines[crack];
@@ -261,8 +261,8 @@ bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     return at_end == (side >= -rounding);
 }
 
-// Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi on
-// its right, or a little beyond where the crack bends.
+// Angle of a place seen from the tip, counted from the direction ahead [rad]: up to pi on the left of the crack and down to -pi
+// on its right, or a little beyond where the crack bends.
 double angle_from_tip(const CrackLine& line, bool at_end, const Vec2& x) {
     const CrackTip& tip = line.tip(at_end);
     const Vec2 arm = x - tip.position;
@@ -275,17 +275,17 @@ double angle_from_tip(const CrackLine& line, bool at_end, const Vec2& x) {
 
 // What a point adds to the interaction integral, as seen in some axes.
 struct Seen {
-    Mat2 gradient;      // of the displacement
-    Mat2 stress;        // [Pa]
+    Mat2 gradient;  // of the displacement
+    Mat2 stress;    // [Pa]
     Mat2 strain;
-    Vec2 inertia;       // density times acceleration [N/m^3]
-    Vec2 q;             // virtual extension
-    Mat2 q_gradient;    // [1/m]
+    Vec2 inertia;     // density times acceleration [N/m^3]
+    Vec2 q;           // virtual extension
+    Mat2 q_gradient;  // [1/m]
 
     Seen in(const Mat2& axes) const {
         const Mat2 back = axes.transpose();
-        return {back * gradient * axes, back * stress * axes, back * strain * axes,
-                back * inertia,         back * q,             back * q_gradient * axes};
+        return {back * gradient * axes,  back * stress * axes, back * strain * axes, back * inertia, back * q,
+                back * q_gradient * axes};
     }
 };
 
@@ -312,10 +312,10 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // place to place (Dolbow and Gosz 2002; Kim and Paulino 2005):
 //     M = int [ (s_ij a_i,k + t_ij u_i,k - t_mn e_mn d_kj) q_k,j + (S_ijmn s_mn t_ij,k - e_ij t_ij,k + rho u_i,tt a_i,k) q_k ] dA
 // with a, t the near-tip displacement and stress of unit K in wood of compliance S, that at the tip; G = K^T H K gives
-// K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009). Seen
-// from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as well.
-// Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2.
-// Left out: the speed of a running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
+// K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009).
+// Seen from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as
+// well. Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2. Left out: the speed of a
+// running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
 Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
                        const Extension& extension, const NodalState& nodal, const std::vector<FacePiece>& pieces, bool rotates) {
     const Points& points = body.points;
@@ -342,7 +342,8 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
             const NearTipField::Mode& near = modes[mode];
             const Mat2 works = near.gradient.transpose() * s.stress + s.gradient.transpose() * near.stress;
             double integrand = works.cwiseProduct(s.q_gradient).sum() -
-                               near.stress.cwiseProduct(s.strain).sum() * s.q_gradient.trace() + s.inertia.dot(near.gradient * s.q);
+                               near.stress.cwiseProduct(s.strain).sum() * s.q_gradient.trace() +
+                               s.inertia.dot(near.gradient * s.q);
             if (!points.changes.empty())
                 for (int k = 0; k < 2; ++k) integrand += s.q[k] * other_wood.cwiseProduct(near.stress_slope[k]).sum();
             sum[mode] += integrand * points.volume[p];
@@ -368,7 +369,7 @@ bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const
     return std::abs(materials.average(centre, half).plane_modulus() - here) < 1e-6 * here;
 }
 
-} // namespace
+}  // namespace
 
 Vec2 opening_behind(const CrackFields& cracks, int crack, bool at_end, double cell, const std::vector<Vec2>& displacement) {
     return cracks.opening(crack, cracks.lines[crack].behind(at_end, 1.5 * cell), displacement);
@@ -409,4 +410,4 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     return load;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

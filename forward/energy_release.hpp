@@ -12,15 +12,15 @@ struct NodalState {
     const std::vector<Vec2>& displacement;  // [m]
     const std::vector<Vec2>& velocity;      // [m/s]
     const std::vector<Vec2>& acceleration;  // [m/s^2]
-    std::span<const Vec2> faces = {};       // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
+    std::span<const Vec2> faces = {};  // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
 };
 
 struct TipLoad {
-    double G = 0;             // energy release rate [J/m^2]
-    double K_I = 0;           // [Pa sqrt(m)]
-    double K_II = 0;          // [Pa sqrt(m)]
+    double G = 0;                 // energy release rate [J/m^2]
+    double K_I = 0;               // [Pa sqrt(m)]
+    double K_II = 0;              // [Pa sqrt(m)]
     Vec2 opening = Vec2::Zero();  // displacement jump just behind the tip, the left face less the right [m]
-    double toughness = 0;     // of the wood at the tip [J/m^2]
+    double toughness = 0;         // of the wood at the tip [J/m^2]
 };
 
 /// Displacement jump just behind a tip, the left face less the right [m].
@@ -32,8 +32,8 @@ struct EnergyReleaseOptions {
     double inner = 2.0;        // the part that moves rigidly with the tip
     double outer = 4.5;        // beyond it nothing moves
     double margin = 1.0;       // and wood that changes so near beyond that makes J uncertain still
-    double least_inner = 1.0;        // holds the tied pair at the tip
-    double least_outer = 3.0;        // in other wood
+    double least_inner = 1.0;  // holds the tied pair at the tip
+    double least_outer = 3.0;  // in other wood
     double least_outer_at_cracks = 2.0;
     bool rotates = false;
 };
@@ -43,12 +43,13 @@ struct EnergyReleaseOptions {
 /// and a virtual extension q that follows the crack):
 ///     G = int [ P_ij u_i,k q_k,j - (W + T) q_k,k + rho (a_i u_i,k - v_i v_i,k) q_k - (W_,k + T_,k)|explicit q_k ] dA
 ///         - int t_i [u_i],k q_k ds,
-/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces that touch
-/// or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the tip. K_I and
-/// K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left, seen toward the tip, ahead, and
-/// turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree within the discretisation error,
-/// K's is the smaller one where the crack is oblique to the grid or boundaries are near (`tips_test`).
+/// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces
+/// that touch or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the
+/// tip. K_I and K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left,
+/// seen toward the tip, ahead, and turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree
+/// within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are near
+/// (`tips_test`).
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 
-} // namespace crampfit
+}  // namespace crampfit

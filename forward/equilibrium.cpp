@@ -12,32 +12,33 @@ namespace crampfit {
 
 namespace {
 
-// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with less,
-// it would spoil the condition of the stiffness; with more, the energy would go in steps.
+// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with
+// less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
 constexpr double least_freed = 0.02;
 
 // Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
 constexpr double face_stiffness_factor = 100.0;
 
-// Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner does not
-// always come below 1e-9.
+// Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner
+// does not always come below 1e-9.
 constexpr double balance = 1e-7;
-// What is less than this part of the largest force out of balance is left over from the solution before: where all else is nothing, as
-// away from a tip that has grown, the factor's parts need not be asked.
+// What is less than this part of the largest force out of balance is left over from the solution before: where all else is
+// nothing, as away from a tip that has grown, the factor's parts need not be asked.
 constexpr double rounding = 1e-11;
 constexpr int most_iterations = 60;
-// Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below, against
-// 1e-3 of a held one.
+// Rounding can leave a small positive pivot where the specimen can move as a whole: the condition is then 1e-12 and below,
+// against 1e-3 of a held one.
 constexpr double least_reciprocal_condition = 1e-10;
 
-// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that many cost
-// as much as a new one.
+// An old tangent goes on as long as so many more steps with it, as quick as the last one, bring the forces into balance: that
+// many cost as much as a new one.
 constexpr double worth_keeping = 2.0;
 // With friction steps do not mend it: it goes on as long as a step makes the forces out of balance smaller by this.
 constexpr double worth_keeping_with_friction = 0.25;
-// A cell keeps its part of the factor until its displacement gradient has changed by this much, and for so many iterations of a solution.
-// Forces are exact all the same, and the steps hardly more (measured: 0.003 to 0.03 take the same time). For the many equilibria,
-// much alike, of a growing crack: else the tangent is exact, which keeps mirror images what they are where equilibrium is unstable.
+// A cell keeps its part of the factor until its displacement gradient has changed by this much, and for so many iterations of a
+// solution. Forces are exact all the same, and the steps hardly more (measured: 0.003 to 0.03 take the same time). For the many
+// equilibria, much alike, of a growing crack: else the tangent is exact, which keeps mirror images what they are where
+// equilibrium is unstable.
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
 constexpr int most_trials = 12;  // of a part of a Newton step
@@ -45,14 +46,13 @@ constexpr int most_trials = 12;  // of a part of a Newton step
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
 constexpr double least_strain = 1e-5;
 
-} // namespace
+}  // namespace
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
-      internal_force_(body, materials, plan.rotates, history_.get()),
-      factor_(body.layout.cells_x, body.layout.cells_y, threads) {
+      internal_force_(body, materials, plan.rotates, history_.get()), factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
@@ -114,8 +114,8 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     return fields;
 }
 
-// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for crumbs,
-// lighter than a cell, between cracks that cross.
+// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for
+// crumbs, lighter than a cell, between cracks that cross.
 void Equilibrium::find_pieces(bool crumbs_only) {
     if (!sliding_.empty()) return;
     const std::vector<double> mass = field_masses(body_, cracks_.fields());
@@ -207,16 +207,17 @@ void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::
 // Points of a cell that follow each other on the same fields go together.
 template <class Visit>
 void Equilibrium::for_groups_of(int c, const Visit& visit) const {
-    for_groups(body_.points, c, [&](const PointGroup& group) {
-        visit(std::as_const(body_.points).node[group.first], group.first, group.count);
-    });
+    for_groups(body_.points, c,
+               [&](const PointGroup& group) { visit(std::as_const(body_.points).node[group.first], group.first, group.count); });
 }
 
 // The same of the points.
 void Equilibrium::couple_points(bool geometric) {
-    if (free_.empty() && std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; })) return;
+    if (free_.empty() && std::all_of(prescribed_step_.begin(), prescribed_step_.end(), [](double step) { return step == 0.0; }))
+        return;
     const auto goes = [&](int f) {
-        return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 || free_of_dof_[2 * f + 1] >= 0;
+        return prescribed_step_[2 * f] != 0.0 || prescribed_step_[2 * f + 1] != 0.0 || free_of_dof_[2 * f] >= 0 ||
+               free_of_dof_[2 * f + 1] >= 0;
     };
     for (int c = 0; c < body_.layout.cells(); ++c)
         for_groups_of(c, [&](std::span<const int> fields, int first, int count) {
@@ -253,7 +254,8 @@ void Equilibrium::add_lone_points() {
         const auto& sign = crosswise_sign;
         Eigen::Matrix<double, 8, 8> tangent;
         for (int a = 0; a < 4; ++a)
-            for (int b = 0; b < 4; ++b) tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
+            for (int b = 0; b < 4; ++b)
+                tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
         add_extra(body_.points.cell[alone.point], body_.points.node[alone.point], tangent);
     }
 }
@@ -267,8 +269,8 @@ void Equilibrium::add_touches(bool geometric) {
     }
 }
 
-// Marks where the tangent is not, to within `slack`, what it was when it was factored. What a growing crack changes is marked already,
-// and in a linear scene that is all.
+// Marks where the tangent is not, to within `slack`, what it was when it was factored. What a growing crack changes is marked
+// already, and in a linear scene that is all.
 void Equilibrium::mark_changes(bool geometric, double slack) {
     const bool other_kind = std::exchange(factored_geometric_, geometric) != geometric;
     if (!free_.empty() || plan_.friction || history_ || other_kind) factor_.mark_all();
@@ -335,7 +337,8 @@ void Equilibrium::move_prescribed() {
 double Equilibrium::slope_along(const Eigen::VectorXd& step) const { return -out_of_balance().dot(step); }
 
 void Equilibrium::move(const Eigen::VectorXd& step, double share) {
-    for (std::size_t k = 0; k < free_.size(); ++k) moved_[free_[k].driver][free_[k].axis] += share * step[equations_ + static_cast<int>(k)];
+    for (std::size_t k = 0; k < free_.size(); ++k)
+        moved_[free_[k].driver][free_[k].axis] += share * step[equations_ + static_cast<int>(k)];
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
         if (const int row = row_of(static_cast<int>(dof)); row >= 0) displacement_[dof / 2][dof % 2] += share * step[row];
 }
@@ -362,8 +365,8 @@ double Equilibrium::take_step(const Eigen::VectorXd& step) {
     return gone;
 }
 
-// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes few
-// directions, which a few steps tell.
+// The tangent as factored, mended by what steps since then have shown of it (limited-memory BFGS, Nocedal 1980): contact changes
+// few directions, which a few steps tell.
 Eigen::VectorXd Equilibrium::newton_step(Eigen::VectorXd load) const {
     std::vector<double> share(lessons_.size());
     for (std::size_t k = lessons_.size(); k-- > 0;) {
@@ -388,7 +391,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     bool renew = true;
     double slack = plan_.grows ? slack_of_tangent : 0.0;
     // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
-    const auto factor = [&] { return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0); };
+    const auto factor = [&] {
+        return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0);
+    };
     find_forces();
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
@@ -404,7 +409,8 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (plan_.linear) load = (load.array().abs() > rounding * load.lpNorm<Eigen::Infinity>()).select(load, 0.0);
         const Eigen::VectorXd step = newton_step(std::move(load));
         step_load_.setZero();
-        const bool moves_boundary = time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
+        const bool moves_boundary =
+            time_ != time || std::any_of(prescribed_step_.begin(), prescribed_step_.end(), [](double d) { return d != 0.0; });
         if (moves_boundary) {  // along the tangent where it stands, all that is prescribed included
             move_prescribed();
             move(step, 1.0);
@@ -422,8 +428,9 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             return Outcome::solved;
         }
         if (iteration >= quick_iterations) slack = 0.0;
-        renew = plan_.friction ? residual > worth_keeping_with_friction * before
-              : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
+        renew = plan_.friction
+                    ? residual > worth_keeping_with_friction * before
+                    : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
     return Outcome::not_converged;
 }
@@ -442,14 +449,15 @@ double Equilibrium::strain_energy() const {
 double Equilibrium::traction_work() const {
     double work = 0.0;
     for (const Boundary::Traction& t : boundary_.tractions)
-        for (int k = 0; k < 4; ++k)
-            work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+        for (int k = 0; k < 4; ++k) work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
     for (const Free& free : free_) work += free.force * moved_[free.driver][free.axis];
     return work;
 }
 
 double Equilibrium::potential() const {
-    if (!potential_) potential_ = strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+    if (!potential_)
+        potential_ =
+            strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
     return *potential_;
 }
 
@@ -487,7 +495,9 @@ void Equilibrium::mark_moved_points(const PointTable<int>& before) {
     }
 }
 
-Equilibrium::Snapshot Equilibrium::save() const { return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()}; }
+Equilibrium::Snapshot Equilibrium::save() const {
+    return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()};
+}
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
@@ -521,4 +531,4 @@ bool Equilibrium::relax(const std::vector<Vec2>& displacement) {
     return true;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -19,10 +19,10 @@ namespace crampfit {
 
 /// Static equilibrium of points, grid, crack fields and bodies for given crack tips: the displacement that makes the potential
 ///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions and forces on bodies
-/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or closed
-/// crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi holds what
-/// friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that remembers: an
-/// increment takes its history along, and Pi holds what it has dissipated.
+/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or
+/// closed crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi
+/// holds what friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that
+/// remembers: an increment takes its history along, and Pi holds what it has dissipated.
 ///
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
@@ -35,8 +35,8 @@ class Equilibrium {
     /// From where it stands, solves for what the boundary prescribes at `time`.
     Outcome solve(double time);
 
-    /// One more correction after `solve`, with the tangent at hand, for those who read displacements: it leaves a tenth of what the
-    /// method does where it ends, or less. Not with friction or wood that remembers, where a solution is an increment.
+    /// One more correction after `solve`, with the tangent at hand, for those who read displacements: it leaves a tenth of what
+    /// the method does where it ends, or less. Not with friction or wood that remembers, where a solution is an increment.
     void refine();
 
     /// Moves a crack tip. The displacement stays, new fields start with that of the field that they come from; `solve` next.
@@ -49,13 +49,13 @@ class Equilibrium {
     const std::vector<Vec2>& displacements() const { return displacement_; }
     const History* history() const { return history_.get(); }  // null: no wood remembers
 
-    double potential() const;                      // Pi [J]
-    double strain_energy() const;                  // in the points and in the ties [J]
-    double traction_work() const;                  // of tractions and forces on bodies, times displacement [J]
-    double dissipated() const;                     // by friction and in wood that remembers so far [J]
-    double measured_displacement(double time) const;  // of the edge or body that is measured, the way it goes [m]
+    double potential() const;                                         // Pi [J]
+    double strain_energy() const;                                     // in the points and in the ties [J]
+    double traction_work() const;                                     // of tractions and forces on bodies, times displacement [J]
+    double dissipated() const;                                        // by friction and in wood that remembers so far [J]
+    double measured_displacement(double time) const;                  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
-    double power() const;                          // of what prescribes motion, dPi/dt at standing cracks [W]
+    double power() const;                                             // of what prescribes motion, dPi/dt at standing cracks [W]
     TipLoad load_at(int crack, bool at_end) const { return load_at(crack, at_end, displacement_, materials_); }
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
     int factorisations() const { return factorisations_; }
@@ -66,8 +66,8 @@ class Equilibrium {
         std::vector<Vec2> fields;   // [fields]
     };
 
-    /// The motions that such motions of the drivers bring about from here on, by the tangent at this equilibrium. None where that is
-    /// not positive definite.
+    /// The motions that such motions of the drivers bring about from here on, by the tangent at this equilibrium. None where that
+    /// is not positive definite.
     std::vector<Motion> motions(const std::vector<std::vector<Vec2>>& drivers);
 
     /// The motion that this load on the points and facets would bring about [N].
@@ -75,9 +75,9 @@ class Equilibrium {
 
     /// Derivatives by numbers of the materials at this equilibrium.
     struct Slopes {
-        Eigen::VectorXd potential;   // [numbers] [J / unit]
-        Eigen::MatrixXd fields;      // [2 x fields, numbers] of the potential's slope by displacements, these as they are [N / unit]
-        Eigen::MatrixXd drivers;     // [2 x drivers, numbers] and by what drivers go, of bodies that slide
+        Eigen::VectorXd potential;  // [numbers] [J / unit]
+        Eigen::MatrixXd fields;   // [2 x fields, numbers] of the potential's slope by displacements, these as they are [N / unit]
+        Eigen::MatrixXd drivers;  // [2 x drivers, numbers] and by what drivers go, of bodies that slide
 
         /// Of the potential's slope along a motion, as it is found anew where the number is another.
         double along(const Motion& motion, int number) const;
@@ -90,8 +90,8 @@ class Equilibrium {
     /// The derivative of G at a tip by a number, with that of the displacements [J/m^2 / unit].
     double release_slope(int crack, bool at_end, const MaterialSlope& number, const std::vector<Vec2>& displacement_slope);
 
-    /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what friction
-    /// and wood remember. Empty: as it was at the start.
+    /// What besides the displacement and the cracks tells a state: how far bodies have come that follow a force, and what
+    /// friction and wood remember. Empty: as it was at the start.
     struct Contacts {
         std::vector<Vec2> moved;                // [drivers] [m]
         std::vector<std::vector<Grip>> bodies;  // [bodies that push]
@@ -156,7 +156,9 @@ class Equilibrium {
     void settle();
     void set_contacts(const Contacts& contacts);
     bool border_tangent();
-    int row_of(int dof) const { return equation_[dof] >= 0 || free_of_dof_[dof] < 0 ? equation_[dof] : equations_ + free_of_dof_[dof]; }
+    int row_of(int dof) const {
+        return equation_[dof] >= 0 || free_of_dof_[dof] < 0 ? equation_[dof] : equations_ + free_of_dof_[dof];
+    }
     int row_of_body(int driver, int axis) const;
     Eigen::VectorXd out_of_balance() const;
     Eigen::VectorXd bordered_step(const Eigen::VectorXd& right) const;
@@ -188,38 +190,39 @@ class Equilibrium {
     std::vector<Vec2> displacement_;  // [m]
     std::vector<Vec2> force_;         // out of balance [N]
 
-    std::vector<Vec2> reaction_;      // [drivers] [N]
-    double least_force_ = 0;          // [N]
-    double contact_energy_ = 0;       // [J]
-    double face_energy_ = 0;          // [J]
+    std::vector<Vec2> reaction_;               // [drivers] [N]
+    double least_force_ = 0;                   // [N]
+    double contact_energy_ = 0;                // [J]
+    double face_energy_ = 0;                   // [J]
     mutable std::optional<double> potential_;  // [J]; empty: not asked for since the forces were found
-    double time_ = 0;                 // [s]
-    double next_time_ = 0;            // that is being solved for [s]
-    std::vector<Vec2> still_to_go_;   // [drivers] until then [m]
+    double time_ = 0;                          // [s]
+    double next_time_ = 0;                     // that is being solved for [s]
+    std::vector<Vec2> still_to_go_;            // [drivers] until then [m]
 
     GridFactor factor_;
-    LoosePieces pieces_;              // that cracks have cut free
-    std::vector<int> equation_;       // [2 x fields] its equation, or -1: prescribed or without points
+    LoosePieces pieces_;         // that cracks have cut free
+    std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
-    std::vector<Mat2> pair_stiffness_;  // [pairs] as last factored [N/m]
+    std::vector<Mat2> pair_stiffness_;               // [pairs] as last factored [N/m]
     std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
-    std::vector<double> prescribed_step_;  // [2 x fields] what prescribed components still have to go [m]
-    Eigen::VectorXd step_load_;       // what that puts on the equations and the free bodies [N]
-    std::vector<Mat2> factored_at_;   // [points] gradient at which its cell was factored; of points on the same fields the first counts
+    std::vector<double> prescribed_step_;            // [2 x fields] what prescribed components still have to go [m]
+    Eigen::VectorXd step_load_;                      // what that puts on the equations and the free bodies [N]
+    std::vector<Mat2>
+        factored_at_;  // [points] gradient at which its cell was factored; of points on the same fields the first counts
     bool factored_geometric_ = true;  // how
     std::vector<int> touched_cells_;  // by bodies, in the factor
     int factorisations_ = 0;
     struct Lesson {
-        Eigen::VectorXd step;         // that was taken [m]
-        Eigen::VectorXd force;        // that it needed [N]
-        double work;                  // their product [J]
+        Eigen::VectorXd step;   // that was taken [m]
+        Eigen::VectorXd force;  // that it needed [N]
+        double work;            // their product [J]
     };
-    std::vector<Lesson> lessons_;     // since the tangent was factored
+    std::vector<Lesson> lessons_;  // since the tangent was factored
 
     // Bodies that follow a force:
     struct Free {
         int driver, axis;
-        double force;                 // on the body [N]
+        double force;  // on the body [N]
     };
     std::vector<Free> free_;          // its equations come after the grid's
     std::vector<int> free_of_dof_;    // [2 x fields] the free one that holds it, or -1
@@ -232,22 +235,22 @@ class Equilibrium {
 
     // Round bodies push on more than a cell at a time:
     struct Spread {
-        std::vector<int> rows;        // equations
-        Eigen::MatrixXd stiffness;    // that the cell does not hold [N/m]
+        std::vector<int> rows;      // equations
+        Eigen::MatrixXd stiffness;  // that the cell does not hold [N/m]
     };
-    std::vector<Spread> spread_;      // of touches
+    std::vector<Spread> spread_;  // of touches
 
     // Friction:
-    struct Rubbing {                  // what the factor leaves out of the tangent at a place that rubs: it is not symmetric
+    struct Rubbing {  // what the factor leaves out of the tangent at a place that rubs: it is not symmetric
         std::vector<int> fields;
         std::vector<double> weight;
-        int driver;                   // of the body, or -1
-        Mat2 remainder;               // force on the fields less that on the body by their motion against it, with sign [N/m]
+        int driver;      // of the body, or -1
+        Mat2 remainder;  // force on the fields less that on the body by their motion against it, with sign [N/m]
     };
     std::vector<Rubbing> rubbing_;
-    std::vector<Vec2> settled_;       // displacement from which friction on crack faces counts; empty: no such faces
-    std::vector<Grip> face_grips_;    // [pairs, or fewer: the others have not slid yet]
-    double face_dissipated_ = 0;      // until then [J]
+    std::vector<Vec2> settled_;     // displacement from which friction on crack faces counts; empty: no such faces
+    std::vector<Grip> face_grips_;  // [pairs, or fewer: the others have not slid yet]
+    double face_dissipated_ = 0;    // until then [J]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -22,7 +22,7 @@ constexpr int bisections = 50;
 // Motions of free bodies that meet less stiffness than this part of the largest meet none: no force goes with them.
 constexpr double no_stiffness = 1e-9;
 
-} // namespace
+}  // namespace
 
 void Equilibrium::find_free_bodies() {
     moved_.assign(boundary_.drivers(), Vec2::Zero());
@@ -35,8 +35,8 @@ void Equilibrium::find_free_bodies() {
     if (std::any_of(scene_.cracks.begin(), scene_.cracks.end(), rubs)) settled_ = displacement_;
 }
 
-// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to begin
-// with.
+// Moves a body along its force until its springs, on the specimen as it stands, carry that: Newton's method needs a touch to
+// begin with.
 void Equilibrium::seat(int sliding) {
     const int driver = sliding_driver_[sliding];
     const Body& rigid = scene_.bodies[driver - boundary_.first_body()];
@@ -57,7 +57,8 @@ void Equilibrium::seat(int sliding) {
         high += step;
         if (high > farthest.norm())
             throw InputError(scene_.file.string(), "bodies." + rigid.name + ".force",
-                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()), "the body meets nothing on this way that could carry the force");
+                             fmt::format("{:g} N, {:g} N", rigid.force.x(), rigid.force.y()),
+                             "the body meets nothing on this way that could carry the force");
     }
     double low = std::max(0.0, high - step);
     for (int k = 0; k < bisections; ++k) (carries(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
@@ -89,7 +90,8 @@ bool Equilibrium::border_tangent() {
     factor_.solve(free_motion_);
     const Eigen::MatrixXd schur = free_stiffness_ - free_load_.transpose() * free_motion_;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(0.5 * (schur + schur.transpose()));
-    const double none = no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
+    const double none =
+        no_stiffness * std::max(free_stiffness_.diagonal().maxCoeff(), least_force_ / body_.layout.cell.maxCoeff());
     Eigen::VectorXd yields = Eigen::VectorXd::Zero(schur.rows());
     for (int k = 0; k < yields.size(); ++k) {
         if (modes.eigenvalues()[k] < -none) return false;
@@ -132,8 +134,9 @@ Eigen::VectorXd Equilibrium::remainder_of(const Eigen::VectorXd& step) const {
 
 Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
     if (rubbing_.empty()) return bordered_step(right);
-    return solve_with_remainder(right, [&](const Eigen::VectorXd& x) { return bordered_step(x); },
-                                [&](const Eigen::VectorXd& x) { return remainder_of(x); });
+    return solve_with_remainder(
+        right, [&](const Eigen::VectorXd& x) { return bordered_step(x); },
+        [&](const Eigen::VectorXd& x) { return remainder_of(x); });
 }
 
 void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder) {
@@ -146,7 +149,8 @@ void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const doubl
     const Vec2 force = remainder * apart;
     for (int axis = 0; axis < 2; ++axis) {
         for (std::size_t a = 0; a < fields.size(); ++a)
-            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0) step_load_[row] -= weight[a] * force[axis];
+            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0)
+                step_load_[row] -= weight[a] * force[axis];
         if (const int row = row_of_body(driver, axis); row >= 0) step_load_[row] += force[axis];
     }
 }
@@ -219,8 +223,8 @@ void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
     rigid.let_yield(LocalYield::about(way, rigid, scene_, plan_, materials_, body_));
 }
 
-// What the yield s of stations beyond the grid's takes off the springs' stiffness: with s = A P^T N(d - P s) and K = N' the forces follow
-// the depths d by K - K P (1 + A P^T K P)^-1 A P^T K.
+// What the yield s of stations beyond the grid's takes off the springs' stiffness: with s = A P^T N(d - P s) and K = N' the
+// forces follow the depths d by K - K P (1 + A P^T K P)^-1 A P^T K.
 void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vector<SlidingBody::Touch>& touches) {
     const LocalYield& local = *rigid.yield();
     std::vector<int> fields, stations;
@@ -249,10 +253,12 @@ void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vec
             const double share = next ? at.share : 1.0 - at.share;
             const Vec2 force = share * touch->stiffness * touch->normal;
             for (const SlidingBody::Hold& hold : rigid.holds(touch->facet))
-                for (int k = 0; k < 4; ++k) pull.col(s).segment<2>(2 * place(fields, points.node[hold.point][k])) += hold.weight[k] * force;
+                for (int k = 0; k < 4; ++k)
+                    pull.col(s).segment<2>(2 * place(fields, points.node[hold.point][k])) += hold.weight[k] * force;
             pull.col(s).tail<2>() -= force;
             for (const int other : {0, 1})
-                stiffness(s, place(stations, at.station + other)) += share * touch->stiffness * (other ? at.share : 1.0 - at.share);
+                stiffness(s, place(stations, at.station + other)) +=
+                    share * touch->stiffness * (other ? at.share : 1.0 - at.share);
         }
     }
     const Eigen::MatrixXd yield = local.yield()(stations, stations);
@@ -365,4 +371,4 @@ void Equilibrium::set_contacts(const Contacts& contacts) {
     face_dissipated_ = at_start ? 0.0 : contacts.dissipated.back();
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -6,16 +6,17 @@
 
 namespace crampfit {
 
-// At equilibrium the potential's slope along any displacement is nil, so that its derivative by a number p of the materials is the
-// explicit one: dPi/dp = sum of V W_p(grad u) and so on, W_p the energy of the strain with the slope of the stiffness. What a driver
-// feels is the slope of the potential along a motion m that it brings about, R = dPi/ds; the derivative of that is again explicit,
-// dR/dp = sum of V dW_p/d(grad u) : grad m, whatever u does, as long as m is an equilibrium's own motion (symmetry of the
-// second derivatives).
+// At equilibrium the potential's slope along any displacement is nil, so that its derivative by a number p of the materials is
+// the explicit one: dPi/dp = sum of V W_p(grad u) and so on, W_p the energy of the strain with the slope of the stiffness. What a
+// driver feels is the slope of the potential along a motion m that it brings about, R = dPi/ds; the derivative of that is again
+// explicit, dR/dp = sum of V dW_p/d(grad u) : grad m, whatever u does, as long as m is an equilibrium's own motion (symmetry of
+// the second derivatives).
 
 // What motions of the drivers put on the equations, by the tangent where it stands.
 Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     prescribed_step_.assign(equation_.size(), 0.0);
-    for (const Boundary::Held& held : boundary_.held) prescribed_step_[2 * held.field + held.axis] = drivers[held.driver][held.axis];
+    for (const Boundary::Held& held : boundary_.held)
+        prescribed_step_[2 * held.field + held.axis] = drivers[held.driver][held.axis];
     still_to_go_ = drivers;
     step_load_.setZero(equations_);
     extra_.clear();
@@ -91,7 +92,8 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     for (const UnevenCells::Piece& piece : internal_force_.uneven().pieces()) {
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             if (numbers[n].stiffness(piece.cell).isZero(0.0)) continue;
-            const UnevenCells::State state = internal_force_.uneven().state(piece, numbers[n].unevenness(piece.cell, piece.box), displacement_);
+            const UnevenCells::State state =
+                internal_force_.uneven().state(piece, numbers[n].unevenness(piece.cell, piece.box), displacement_);
             slope.potential[n] += state.energy;
             for (int k = 0; k < 4; ++k) add(n, points.node[piece.point][k], state.force.segment<2>(2 * k));
         }
@@ -111,7 +113,8 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         if (stiffness.isZero(0.0)) continue;
         const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
         for (std::size_t n = 0; n < numbers.size(); ++n) {
-            const double stiffer = numbers[n].opening_modulus(pair.freed_at, 0.5 * body_.layout.cell, pair.along) / pair.plane_modulus;
+            const double stiffer =
+                numbers[n].opening_modulus(pair.freed_at, 0.5 * body_.layout.cell, pair.along) / pair.plane_modulus;
             const Vec2 pull = stiffer * stiffness * jump;
             slope.potential[n] += 0.5 * pull.dot(jump);
             add(n, pair.left, pull);
@@ -127,7 +130,8 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
                 const Facet& facet = body_.facets[touches[k].facet];
                 const auto& constants = points.stiffness[points.cell[facet.point]];
                 const int stiffest = constants[0] >= constants[2] ? 0 : 1;
-                const double stiffer = numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
+                const double stiffer =
+                    numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
                 slope.potential[n] += stiffer * touches[k].energy;
                 forces[k] = stiffer * touches[k].force;
             }
@@ -186,4 +190,4 @@ double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& n
     return (more - less) / (2.0 * number.step());
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -14,11 +14,13 @@ namespace {
 // A pair of fields at a crack tip comes up just before the tip frees it, so that some tie always holds the tip (CrackFields).
 constexpr double least_freed = -0.02;
 
-} // namespace
+}  // namespace
 
-ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
+ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
+                               int threads)
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
+      boundary_(scene, body, cracks_),
+      history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
       internal_force_(body, materials, plan.rotates, history_.get()), team_(threads),
       ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body) {
     const std::size_t fields = cracks_.fields();
@@ -41,20 +43,24 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     place_bodies();
 }
 
-// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its forces
-// are found, and by the rest after them.
+// How far velocities stand behind displacements between steps, in steps. Displacements go on by 1/2 - lag of a step before its
+// forces are found, and by the rest after them.
 double ExplicitSolver::lag() const {
     switch (scene_.solver.stress_update) {
-        case StressUpdate::first: return -0.5;
-        case StressUpdate::average: return 0.0;
-        case StressUpdate::last: break;
+    case StressUpdate::first:
+        return -0.5;
+    case StressUpdate::average:
+        return 0.0;
+    case StressUpdate::last:
+        break;
     }
     return 0.5;
 }
 
 void ExplicitSolver::step() {
     advance_displacements(0.5 - lag());
-    team_.pieces(cracks_.fields(), [&](int first, int last) { std::fill(force_.begin() + first, force_.begin() + last, Vec2::Zero()); });
+    team_.pieces(cracks_.fields(),
+                 [&](int first, int last) { std::fill(force_.begin() + first, force_.begin() + last, Vec2::Zero()); });
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
     inner_forces(time_ + (0.5 - lag()) * plan_.time_step);
     surface_forces();
@@ -216,7 +222,8 @@ double ExplicitSolver::kinetic_energy() const {
     const double dt = plan_.time_step;
     if (!mapping_.is_used()) {
         double sum = 0.0;
-        for (std::size_t n = 0; n < mass_.size(); ++n) sum += 0.5 * mass_[n] * velocity_[n].dot(velocity_[n] - dt * acceleration_[n]);
+        for (std::size_t n = 0; n < mass_.size(); ++n)
+            sum += 0.5 * mass_[n] * velocity_[n].dot(velocity_[n] - dt * acceleration_[n]);
         return sum;
     }
     // v (v - a dt) = (v - a dt / 2)^2 - (a dt / 2)^2
@@ -233,4 +240,4 @@ bool ExplicitSolver::is_finite() const {
     return std::all_of(displacement_.begin(), displacement_.end(), [](const Vec2& u) { return u.allFinite(); });
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -21,26 +21,27 @@ namespace crampfit {
 
 /// Energies of a run so far [J]. In a perfect run work = strain + kinetic + contact + fracture + damped.
 struct EnergyBooks {
-    double work = 0;      // done by edges and bodies
-    double strain = 0;    // in the points, in the ties at a crack tip and in bridged faces
+    double work = 0;    // done by edges and bodies
+    double strain = 0;  // in the points, in the ties at a crack tip and in bridged faces
     double kinetic = 0;
     double contact = 0;   // in the springs of sliding contact
-    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip back;
-                          // and bridged faces
+    double fracture = 0;  // what the tips have taken up: toughness times new area, by `advance`; more where waves hold a tip
+                          // back; and bridged faces
     double damped = 0;    // by drag, by friction and impact of contacts, and in wood that remembers
 };
 
 /// Explicit dynamics in the undeformed specimen: central differences in time (leapfrog; velocities stand half a step behind
 /// displacements), lumped mass. As no point ever leaves its cell, mapping velocities to the points and back by the full mass
-/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps them,
-/// unless the scene asks for another way (VelocityMapping). Displacements may follow velocities at the beginning of a step, at its
-/// end or half and half (`stress_update`): stresses come from displacements.
+/// matrix would give the grid's own velocities again (FMPM of infinite order; Nairn and Hammerquist 2021), so the grid keeps
+/// them, unless the scene asks for another way (VelocityMapping). Displacements may follow velocities at the beginning of a step,
+/// at its end or half and half (`stress_update`): stresses come from displacements.
 class ExplicitSolver {
   public:
     /// `threads` share each step; the result does not depend on how many there are.
     ExplicitSolver(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
 
-    /// Starts from these displacements [m] and velocities [m/s] of the nodes, by place in the undeformed specimen, in place of rest.
+    /// Starts from these displacements [m] and velocities [m/s] of the nodes, by place in the undeformed specimen, in place of
+    /// rest.
     void start(const std::function<Vec2(const Vec2&)>& displacement, const std::function<Vec2(const Vec2&)>& velocity);
 
     /// One time step.
@@ -117,21 +118,21 @@ class ExplicitSolver {
     mutable VelocityMapping mapping_;
 
     // One entry a field.
-    std::vector<double> mass_;        // [kg]
-    std::vector<Vec2> displacement_;  // [m]
-    std::vector<Vec2> velocity_;      // [m/s]
-    std::vector<Vec2> carried_;       // w of VelocityMapping where the nodes do not keep their velocities [m/s]
+    std::vector<double> mass_;             // [kg]
+    std::vector<Vec2> displacement_;       // [m]
+    std::vector<Vec2> velocity_;           // [m/s]
+    std::vector<Vec2> carried_;            // w of VelocityMapping where the nodes do not keep their velocities [m/s]
     std::vector<std::uint8_t> held_axes_;  // a bit an axis where the component is prescribed
-    std::vector<Vec2> acceleration_;  // [m/s^2]
-    std::vector<Vec2> force_;         // [N]
+    std::vector<Vec2> acceleration_;       // [m/s^2]
+    std::vector<Vec2> force_;              // [N]
 
-    std::vector<Vec2> reaction_;      // [edges, then bodies] [N]
-    std::vector<Vec2> face_force_;    // [pairs] what pressed crack faces put on the left one in the last step [N]
-    std::vector<double> damped_;      // [pieces of the fields] in this step [J]
-    std::vector<Tip> tips_;           // two a crack: start, end
-    double fastest_crack_ = 0;        // [m/s]
+    std::vector<Vec2> reaction_;    // [edges, then bodies] [N]
+    std::vector<Vec2> face_force_;  // [pairs] what pressed crack faces put on the left one in the last step [N]
+    std::vector<double> damped_;    // [pieces of the fields] in this step [J]
+    std::vector<Tip> tips_;         // two a crack: start, end
+    double fastest_crack_ = 0;      // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

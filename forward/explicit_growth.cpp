@@ -26,7 +26,7 @@ constexpr double most_turn_cosine = 0.985;
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
 
-} // namespace
+}  // namespace
 
 void ExplicitSolver::grow_cracks() {
     for (int k = 0; k < static_cast<int>(cracks_.lines.size()); ++k)
@@ -111,4 +111,4 @@ void ExplicitSolver::note_speed(Tip& state, double way) {
     state.noted_at = time_;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

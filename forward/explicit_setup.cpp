@@ -15,9 +15,9 @@ void ExplicitSolver::place_bodies() {
         SlidingBody sliding(rigid.shape, body_, rigid.contact.coefficient);
         sliding.limit_frequency(mass_, plan_.added_frequency_squared);
         const double depth = std::max(sliding.deepest(displacement_), 0.0);
-        const bool swallows = std::any_of(body_.points.position.begin(), body_.points.position.end(),
-                                          [&](const Vec2& x) { return inside(rigid.shape, x) &&
-                                              nearest_on_outline(rigid.shape, x).distance > body_.layout.cell.maxCoeff(); });
+        const bool swallows = std::any_of(body_.points.position.begin(), body_.points.position.end(), [&](const Vec2& x) {
+            return inside(rigid.shape, x) && nearest_on_outline(rigid.shape, x).distance > body_.layout.cell.maxCoeff();
+        });
         if (swallows || depth > body_.layout.cell.maxCoeff())
             throw InputError(scene_.file.string(), "bodies." + rigid.name, fmt::format("overlap of {:.3g} mm", depth * 1e3),
                              "a sliding body must not overlap the specimen at the start");
@@ -39,7 +39,8 @@ Vec2 ExplicitSolver::velocity_at_end_of_step(int driver) const {
 
 void ExplicitSolver::list_held() {
     held_axes_.assign(cracks_.fields(), 0);
-    for (const Boundary::Held& h : boundary_.held) held_axes_[h.field] = static_cast<std::uint8_t>(held_axes_[h.field] | 1 << h.axis);
+    for (const Boundary::Held& h : boundary_.held)
+        held_axes_[h.field] = static_cast<std::uint8_t>(held_axes_[h.field] | 1 << h.axis);
 }
 
 // Of a part that moves at the start; edges and bodies hold on to what they hold.
@@ -55,7 +56,8 @@ void ExplicitSolver::start_parts() {
             if (!(held_axes_[n] >> axis & 1)) books_.work += 0.5 * mass_[n] * velocity_[n][axis] * velocity_[n][axis];
 }
 
-void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement, const std::function<Vec2(const Vec2&)>& velocity) {
+void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
+                           const std::function<Vec2(const Vec2&)>& velocity) {
     for (int f = 0; f < cracks_.fields(); ++f) {
         const Vec2 x = body_.layout.node_position(cracks_.node_of_field[f]);
         displacement_[f] = displacement(x);
@@ -96,4 +98,4 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     ties_.take_in(cracks_, mass_, displacement_, false, softness);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

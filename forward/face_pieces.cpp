@@ -28,7 +28,7 @@ double distance_behind(const CrackLine& line, bool at_end, const Vec2& x) {
     return behind;
 }
 
-} // namespace
+}  // namespace
 
 std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at_end, std::span<const Vec2> forces,
                                    const Layout& layout) {
@@ -47,4 +47,4 @@ std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at
     return pieces;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -19,11 +19,11 @@ constexpr double just_beside = 1e-6;
 
 // A smooth piece of an outline, straight or a whole circle; s is the way along it.
 struct Curve {
-    Vec2 from, to;   // [m]
+    Vec2 from, to;  // [m]
     Circle circle;
     bool straight;
-    double length;   // [m]
-    double inward;   // 1: the specimen lies left of the straight way, or around the circle; -1: right, or in it
+    double length;  // [m]
+    double inward;  // 1: the specimen lies left of the straight way, or around the circle; -1: right, or in it
 
     Vec2 position(double s) const {
         if (straight) return from + s / length * (to - from);
@@ -52,7 +52,8 @@ std::vector<Curve> sides_of(const std::vector<Vec2>& points, bool specimen_is_in
 
 std::vector<Curve> outline_of(const Shape& shape, bool specimen_is_inside) {
     if (const auto* circle = std::get_if<Circle>(&shape))
-        return {{Vec2::Zero(), Vec2::Zero(), *circle, false, 2.0 * std::numbers::pi * circle->radius, specimen_is_inside ? -1.0 : 1.0}};
+        return {{Vec2::Zero(), Vec2::Zero(), *circle, false, 2.0 * std::numbers::pi * circle->radius,
+                 specimen_is_inside ? -1.0 : 1.0}};
     return sides_of(std::get<Polygon>(shape).points, specimen_is_inside);
 }
 
@@ -84,9 +85,10 @@ std::vector<Stretch> stretches(double length, double step, IsSurface is_surface)
     return found;
 }
 
-} // namespace
+}  // namespace
 
-// The point whose domain holds x. Where none is, the nearest one of the same cell or, if that has none, of the neighbourhood; or -1.
+// The point whose domain holds x. Where none is, the nearest one of the same cell or, if that has none, of the neighbourhood; or
+// -1.
 int Discretisation::point_beside(const Vec2& x) const {
     if (const int own = point_at(x); own >= 0) return own;
     int nearest = -1;
@@ -117,8 +119,8 @@ void Discretisation::find_facets(const Scene& scene) {
         const auto end = cutouts.begin() + static_cast<std::ptrdiff_t>(count);
         return std::any_of(cutouts.begin(), end, [&](const Shape& s) { return inside(s, x); });
     };
-    // Where the outlines of two cutouts fall together, the earlier one has the facets; where a part's falls on the rectangle's side or
-    // on a cutout, that has them.
+    // Where the outlines of two cutouts fall together, the earlier one has the facets; where a part's falls on the rectangle's
+    // side or on a cutout, that has them.
     const auto add_curve = [&](const Curve& curve, std::size_t earlier, bool of_part) {
         const auto is_surface = [&](double s) {
             const Vec2 in = curve.position(s) - beside * curve.normal(s);
@@ -135,7 +137,8 @@ void Discretisation::find_facets(const Scene& scene) {
             }
         }
     };
-    for (const Curve& side : sides_of({Vec2::Zero(), Vec2(size.x(), 0.0), size, Vec2(0.0, size.y())}, true)) add_curve(side, 0, false);
+    for (const Curve& side : sides_of({Vec2::Zero(), Vec2(size.x(), 0.0), size, Vec2(0.0, size.y())}, true))
+        add_curve(side, 0, false);
     for (std::size_t k = 0; k < cutouts.size(); ++k)
         for (const Curve& curve : outline_of(cutouts[k], false)) add_curve(curve, k, false);
     for (const Part& part : scene.specimen.parts)
@@ -159,4 +162,4 @@ void Discretisation::add_void_facets(const SpecimenPlan& specimen) {
     }
 }
 
-} // namespace crampfit
+}  // namespace crampfit

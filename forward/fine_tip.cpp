@@ -9,9 +9,9 @@ namespace crampfit {
 
 namespace {
 
-// Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of. What the held outlines take from the wood
-// beyond leaves 1 % in the load that carries a crack across a boundary 30 : 1, half of that with 8 in place of 6; as much is left by cells
-// of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`).
+// Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of. What the held outlines take from
+// the wood beyond leaves 1 % in the load that carries a crack across a boundary 30 : 1, half of that with 8 in place of 6; as
+// much is left by cells of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`).
 constexpr std::array<double, 2> half_widths{6.0, 4.0};
 
 // Boxes begin and end at each second of these cells, so that those of neighbouring places are the same more often.
@@ -26,8 +26,8 @@ constexpr double least_contrast = 2.0;
 // In cells from the way to such a side: all that is missed counts up to the first, nothing from the second on.
 constexpr double near = 3.0, far = 4.0;
 
-// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Far more, or
-// less than half, says that both do not see a crack that has turned sharply alike. The bounds are a judgement: in the paper's
+// Finer cells about a tip hold less energy under the same outline, or little more where they average woods otherwise. Far more,
+// or less than half, says that both do not see a crack that has turned sharply alike. The bounds are a judgement: in the paper's
 // scenes sound boxes hold 5 % more to 25 % less.
 constexpr double most_of_coarse = 1.1, least_of_coarse = 0.5;
 
@@ -44,7 +44,9 @@ double distance_between(const std::array<Vec2, 2>& a, const std::array<Vec2, 2>&
 // What part of the energy missed on a way counts.
 double share_that_counts(const Discretisation& body, const Vec2& from, const Vec2& to) {
     const Layout& layout = body.layout;
-    const auto in_cells = [&](const Vec2& a, const Vec2& b) { return std::array<Vec2, 2>{a.cwiseQuotient(layout.cell), b.cwiseQuotient(layout.cell)}; };
+    const auto in_cells = [&](const Vec2& a, const Vec2& b) {
+        return std::array<Vec2, 2>{a.cwiseQuotient(layout.cell), b.cwiseQuotient(layout.cell)};
+    };
     const auto has_wood = [&](int c) { return body.points.first_of_cell[c] < body.points.first_of_cell[c + 1]; };
     double nearest = far;
     const Vec2 reach = (far + 1.0) * layout.cell;
@@ -56,7 +58,8 @@ double share_that_counts(const Discretisation& body, const Vec2& from, const Vec
             double contrast = 1.0;
             for (const int k : {0, 2}) contrast = std::max({contrast, here[k] / there[k], there[k] / here[k]});
             // A way that crosses the side ends within `near` of it.
-            if (contrast >= least_contrast) nearest = std::min(nearest, distance_between(in_cells(from, to), in_cells(side_from, side_to)));
+            if (contrast >= least_contrast)
+                nearest = std::min(nearest, distance_between(in_cells(from, to), in_cells(side_from, side_to)));
         };
         const Vec2 low = layout.cell_corner(c), high = low + layout.cell;
         if (c % layout.cells_x + 1 < layout.cells_x) compare(c + 1, {high.x(), low.y()}, high);
@@ -76,7 +79,8 @@ Box box_around(const Box& way, double half_width, const Vec2& cell, const Box& w
 // Whether nothing but the wood around it acts on a box of the specimen, and no crack but this one runs through it.
 bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box, const Vec2& size) {
     const Vec2 hair = 1e-6 * size;
-    const bool meets[] = {box.high.y() > size.y() - hair.y(), box.low.y() < hair.y(), box.low.x() < hair.x(), box.high.x() > size.x() - hair.x()};
+    const bool meets[] = {box.high.y() > size.y() - hair.y(), box.low.y() < hair.y(), box.low.x() < hair.x(),
+                          box.high.x() > size.x() - hair.x()};
     for (const Edge& edge : scene.edges)
         if (meets[static_cast<int>(edge.side)]) return false;
     const Vec2 middle = 0.5 * (box.low + box.high);
@@ -96,12 +100,13 @@ Mat2 turn_of(const Discretisation& body, const Box& box, const std::vector<Vec2>
     Mat2 mean = Mat2::Zero();
     int points = 0;
     body.for_cells_in({box.low + 0.5 * body.layout.cell, box.high - 0.5 * body.layout.cell}, [&](int c) {
-        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p, ++points) mean += gradient_at(body, p, displacement);
+        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p, ++points)
+            mean += gradient_at(body, p, displacement);
     });
     return Polar(mean / points).turn;
 }
 
-} // namespace
+}  // namespace
 
 bool TipBoxes::hold(const Vec2& tip, const Vec2& cell) const {
     const Vec2 depth = 0.5 * half_widths[1] * 0.5 * cell;
@@ -123,7 +128,8 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
     const Box way{from.cwiseMin(to), from.cwiseMax(to)};
     Box within{Vec2::Zero(), size};
     Vec2 cell = body_.layout.cell;
-    for (std::size_t k = 0; k < half_widths.size(); ++k, cell *= 0.5) within = found.boxes[k] = box_around(way, half_widths[k], cell, within);
+    for (std::size_t k = 0; k < half_widths.size(); ++k, cell *= 0.5)
+        within = found.boxes[k] = box_around(way, half_widths[k], cell, within);
     if (!stands_alone(scene_, cracks, crack, found.boxes[0], size)) return std::nullopt;
     return found;
 }
@@ -201,4 +207,4 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     return missed;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -11,9 +11,10 @@ namespace crampfit {
 
 /// What the grid misses of the potential at a crack tip that passes a sharp boundary between woods.
 struct MissedEnergy {
-    double energy = 0;                  // to be added to the potential [J]
-    std::vector<double> by_number;      // its slope by the numbers, the grid's displacements as they are [J / unit]
-    std::vector<Vec2> by_displacement;  // and by the displacements of the grid's fields [N]; empty like `by_number` where none is asked for
+    double energy = 0;              // to be added to the potential [J]
+    std::vector<double> by_number;  // its slope by the numbers, the grid's displacements as they are [J / unit]
+    std::vector<Vec2>
+        by_displacement;  // and by the displacements of the grid's fields [N]; empty like `by_number` where none is asked for
 };
 
 /// Boxes about the way of a tip over an advance, one within the other.
@@ -25,25 +26,27 @@ struct TipBoxes {
     bool hold(const Vec2& tip, const Vec2& cell) const;
 };
 
-/// The energy of a crack in one wood is right to some parts in a thousand of G times a cell, wherever its tip lies in a cell: `tip_lag`
-/// and the ties see to that. Where the tip passes into wood many times as stiff, G falls to nothing and rises again within a cell, and
-/// the grid gives up to twice the energy that the next cells release. So the wood around the tip is cut out with its outline held where the
-/// grid has it, and solved with cells as they are and half as wide; within that a smaller box is, with cells a quarter as wide. The
-/// differences add up to what is missed, to first order in them (the fast adaptive composite idea of McCormick 1984, one way down).
+/// The energy of a crack in one wood is right to some parts in a thousand of G times a cell, wherever its tip lies in a cell:
+/// `tip_lag` and the ties see to that. Where the tip passes into wood many times as stiff, G falls to nothing and rises again
+/// within a cell, and the grid gives up to twice the energy that the next cells release. So the wood around the tip is cut out
+/// with its outline held where the grid has it, and solved with cells as they are and half as wide; within that a smaller box is,
+/// with cells a quarter as wide. The differences add up to what is missed, to first order in them (the fast adaptive composite
+/// idea of McCormick 1984, one way down).
 ///
-/// The finer cells see the same wood otherwise averaged, whatever the tip does. That is as much in the same boxes before an advance and
-/// after it, and takes no part in what the advance releases; in boxes that follow the tip it would.
+/// The finer cells see the same wood otherwise averaged, whatever the tip does. That is as much in the same boxes before an
+/// advance and after it, and takes no part in what the advance releases; in boxes that follow the tip it would.
 class FineTip {
   public:
     /// All must outlive this. `numbers`: of the materials, by which slopes may be asked for.
     FineTip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
             const std::vector<MaterialSlope>& numbers);
 
-    /// Boxes for a tip on the way from one place to another. None where no sharp boundary lies within 4 cells of the way, nor where the
-    /// boxes meet anything that holds or loads the specimen, or another crack.
+    /// Boxes for a tip on the way from one place to another. None where no sharp boundary lies within 4 cells of the way, nor
+    /// where the boxes meet anything that holds or loads the specimen, or another crack.
     std::optional<TipBoxes> about(const CrackFields& cracks, int crack, const Vec2& from, const Vec2& to) const;
 
-    /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing. With its slopes by the numbers, or without.
+    /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing. With its slopes by the numbers, or
+    /// without.
     MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
 
   private:
@@ -58,4 +61,4 @@ class FineTip {
     std::deque<std::unique_ptr<CutOut>> kept_;  // those asked for last, the last one first: neighbouring places share them
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -13,7 +13,7 @@ namespace {
 constexpr int most_directions = 60;
 constexpr double linear_balance = 1e-9;  // of the right side: far below what one step of Newton's method leaves
 
-} // namespace
+}  // namespace
 
 // With t along the surface, n its normal, k its curvature and d what the place has gone, the spring's stretch is
 //     e = e_before + share d.t,   share = depth / (depth - depth_before) of a place that did not touch before,
@@ -45,12 +45,14 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     }
     result.tangent = -t * slope.transpose() + force * pressing.curvature * n * t.transpose();
     result.energy = 0.5 * stiffness * result.stretch * result.stretch;
-    // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before + slid).
+    // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before +
+    // slid).
     result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * slid;
     return result;
 }
 
-Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right, const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& inverse,
+Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right,
+                                     const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& inverse,
                                      const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& remainder) {
     // x = M^-1 y with (1 + E M^-1) y = right, y among right, E M^-1 right, ...: an orthonormal basis by Arnoldi's method.
     const double size = right.norm();
@@ -76,4 +78,4 @@ Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right, const std::fu
     return inverse(y);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -17,26 +17,26 @@ struct Grip {
 
 /// A place where two surfaces press on each other, and how it got there from the state that was kept last.
 struct Pressing {
-    Vec2 normal;             // unit, the way that the contact pushes the place
-    double curvature = 0.0;  // of the surfaces of equal depth, 1 / radius [1/m]
-    double force = 0.0;      // along the normal [N]
-    double stiffness = 0.0;  // change of that force with depth [N/m]
-    double depth = 0.0;      // [m]
-    double depth_before = 0; // then; below 0: it did not touch [m]
-    Vec2 gone = Vec2::Zero();// of the place against what it touches, since then [m]
+    Vec2 normal;               // unit, the way that the contact pushes the place
+    double curvature = 0.0;    // of the surfaces of equal depth, 1 / radius [1/m]
+    double force = 0.0;        // along the normal [N]
+    double stiffness = 0.0;    // change of that force with depth [N/m]
+    double depth = 0.0;        // [m]
+    double depth_before = 0;   // then; below 0: it did not touch [m]
+    Vec2 gone = Vec2::Zero();  // of the place against what it touches, since then [m]
 };
 
 /// Coulomb friction at such a place: a spring along the surface that slips where its force reaches `coefficient` times the normal
 /// force (return mapping; Wriggers 2006, ch. 5). How far it slides counts from where it begins to touch on the way, taken for
 /// straight.
 struct Drag {
-    Vec2 force = Vec2::Zero();      // on the place [N]
-    Mat2 tangent = Mat2::Zero();    // minus its slope by the place [N/m]; not symmetric where it slides or the surface is curved
-    double stiffness = 0.0;         // of the symmetric part that holds the place while it does not slide, along the surface [N/m]
-    double stretch = 0.0;           // of the spring [m]
-    double limit = 0.0;             // [N]
-    double energy = 0.0;            // in the spring [J]
-    double dissipated = 0.0;        // since the state that was kept [J]
+    Vec2 force = Vec2::Zero();    // on the place [N]
+    Mat2 tangent = Mat2::Zero();  // minus its slope by the place [N/m]; not symmetric where it slides or the surface is curved
+    double stiffness = 0.0;       // of the symmetric part that holds the place while it does not slide, along the surface [N/m]
+    double stretch = 0.0;         // of the spring [m]
+    double limit = 0.0;           // [N]
+    double energy = 0.0;          // in the spring [J]
+    double dissipated = 0.0;      // since the state that was kept [J]
 };
 
 /// `stiffness` of the spring in N/m.
@@ -44,7 +44,8 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
 
 /// Solves (M + E) x = right, given x -> M^-1 x and x -> E x, where E is small against M (GMRES, Saad and Schultz 1986, with M as
 /// preconditioner from the right).
-Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right, const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& inverse,
+Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right,
+                                     const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& inverse,
                                      const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& remainder);
 
-} // namespace crampfit
+}  // namespace crampfit

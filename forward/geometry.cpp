@@ -19,9 +19,7 @@ bool inside_polygon(const std::vector<Vec2>& points, const Vec2& x) {
     for (std::size_t k = 0, last = points.size() - 1; k < points.size(); last = k++) {
         const Vec2& a = points[k];
         const Vec2& b = points[last];
-        if ((a.y() > x.y()) != (b.y() > x.y()) &&
-            x.x() < (b.x() - a.x()) * (x.y() - a.y()) / (b.y() - a.y()) + a.x())
-            in = !in;
+        if ((a.y() > x.y()) != (b.y() > x.y()) && x.x() < (b.x() - a.x()) * (x.y() - a.y()) / (b.y() - a.y()) + a.x()) in = !in;
     }
     return in;
 }
@@ -39,7 +37,7 @@ OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x) 
     return best;
 }
 
-} // namespace
+}  // namespace
 
 bool inside(const Shape& shape, const Vec2& x) {
     if (const auto* circle = std::get_if<Circle>(&shape)) return (x - circle->centre).norm() <= circle->radius;
@@ -106,4 +104,4 @@ double distance_to(const std::vector<Vec2>& line, const Vec2& x) {
     return least;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

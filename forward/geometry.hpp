@@ -16,9 +16,7 @@ struct Box {
     Vec2 high;  // [m]
 
     bool contains(const Vec2& x) const { return (x.array() >= low.array()).all() && (x.array() <= high.array()).all(); }
-    bool touches(const Box& b) const {
-        return (low.array() <= b.high.array()).all() && (b.low.array() <= high.array()).all();
-    }
+    bool touches(const Box& b) const { return (low.array() <= b.high.array()).all() && (b.low.array() <= high.array()).all(); }
 };
 
 /// True inside the shape and on its outline.
@@ -47,4 +45,4 @@ double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x);
 /// From a place to the nearest of a line of at least two vertices [m].
 double distance_to(const std::vector<Vec2>& line, const Vec2& x);
 
-} // namespace crampfit
+}  // namespace crampfit

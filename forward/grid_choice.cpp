@@ -16,14 +16,14 @@ namespace crampfit {
 
 namespace {
 
-constexpr double cells_of_coarsest = 16;    // across the smaller side
+constexpr double cells_of_coarsest = 16;  // across the smaller side
 constexpr double most_cells_tried = 128;
 constexpr double most_cells_chosen = 512;
-constexpr int multiple = 4;                 // of cells: places on lines of the grids tried lie on lines of the chosen one
-constexpr double safety = 1.25;             // Roache's, for three grids
+constexpr int multiple = 4;      // of cells: places on lines of the grids tried lie on lines of the chosen one
+constexpr double safety = 1.25;  // Roache's, for three grids
 constexpr double least_power = 0.5;
 constexpr double most_power = 2.0;
-constexpr double power_of_time = 3.0;       // of cells to a side: cells times stations or factorisation
+constexpr double power_of_time = 3.0;  // of cells to a side: cells times stations or factorisation
 
 struct Quantity {
     std::string name;
@@ -31,7 +31,7 @@ struct Quantity {
 };
 
 struct Trial {
-    double cells;                        // across the smaller side
+    double cells;  // across the smaller side
     std::vector<Quantity> quantities;
     double seconds;
 };
@@ -51,7 +51,8 @@ std::vector<Quantity> quantities_of(const Record& record) {
         if (row.crack_length <= start * (1.0 + 1e-9) && row.displacement != 0.0) loaded = &row;
         largest = std::max(largest, row.force);
     }
-    if (loaded && loaded->force != 0.0) found.push_back({"force over displacement before growth", loaded->force / loaded->displacement});
+    if (loaded && loaded->force != 0.0)
+        found.push_back({"force over displacement before growth", loaded->force / loaded->displacement});
     if (record.driving.empty()) {
         if (record.series.back().G > 0.0) found.push_back({"energy release rate", record.series.back().G});
     } else {
@@ -70,7 +71,8 @@ std::optional<Trial> try_grid(const Scene& scene, double cells) {
     try {
         const Record record = simulate(coarse);
         Trial trial{cells, quantities_of(record), record.seconds};
-        const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(), [](const Quantity& q) { return std::isfinite(q.value); });
+        const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(),
+                                      [](const Quantity& q) { return std::isfinite(q.value); });
         if (record.status == RunStatus::unstable || trial.quantities.empty() || !good) return {};
         return trial;
     } catch (const InputError&) {
@@ -99,7 +101,8 @@ std::vector<Estimate> estimates_of(const Trial& coarse, const Trial& middle, con
     std::vector<Estimate> found;
     for (const Quantity& q : fine.quantities) {
         const auto in = [&](const Trial& trial) {
-            return std::find_if(trial.quantities.begin(), trial.quantities.end(), [&](const Quantity& o) { return o.name == q.name; });
+            return std::find_if(trial.quantities.begin(), trial.quantities.end(),
+                                [&](const Quantity& o) { return o.name == q.name; });
         };
         const auto a = in(coarse), b = in(middle);
         if (a == coarse.quantities.end() || b == middle.quantities.end() || q.value == 0.0) continue;
@@ -113,7 +116,8 @@ std::vector<Estimate> estimates_of(const Trial& coarse, const Trial& middle, con
 }
 
 const Estimate& worst_of(const std::vector<Estimate>& estimates, double cells) {
-    return *std::max_element(estimates.begin(), estimates.end(), [&](const Estimate& a, const Estimate& b) { return a.at(cells) < b.at(cells); });
+    return *std::max_element(estimates.begin(), estimates.end(),
+                             [&](const Estimate& a, const Estimate& b) { return a.at(cells) < b.at(cells); });
 }
 
 // The fewest cells that meet the error; more than `most_cells_chosen` where none do.
@@ -132,10 +136,11 @@ void require_equilibrium(const Scene& scene, double error) {
     const MaterialMap materials(coarse);
     const Discretisation body(coarse, materials);
     if (!make_plan(coarse, materials, body).quasistatic)
-        refuse(scene, error, "the cell is chosen at equilibrium only; explicit dynamics has errors of time and inertia too: give model.cell");
+        refuse(scene, error,
+               "the cell is chosen at equilibrium only; explicit dynamics has errors of time and inertia too: give model.cell");
 }
 
-} // namespace
+}  // namespace
 
 GridChoice choose_grid(const Scene& scene, double error) {
     require_equilibrium(scene, error);
@@ -157,10 +162,15 @@ GridChoice choose_grid(const Scene& scene, double error) {
         chosen = std::max(fewest_cells(estimates, error), trials.front().cells);
         if (chosen <= 2.0 * cells) break;  // else so far beyond the grids tried that one more is worth it
     }
-    if (estimates.empty()) refuse(scene, error, fmt::format("not three of the grids with 16 to {:g} cells across gave a result to compare: give model.cell", most_cells_tried));
+    if (estimates.empty())
+        refuse(scene, error,
+               fmt::format("not three of the grids with 16 to {:g} cells across gave a result to compare: give model.cell",
+                           most_cells_tried));
     if (chosen > most_cells_chosen)
-        refuse(scene, error, fmt::format("{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell", most_cells_chosen,
-                                  100 * worst_of(estimates, most_cells_chosen).at(most_cells_chosen), worst_of(estimates, most_cells_chosen).name));
+        refuse(scene, error,
+               fmt::format("{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell",
+                           most_cells_chosen, 100 * worst_of(estimates, most_cells_chosen).at(most_cells_chosen),
+                           worst_of(estimates, most_cells_chosen).name));
     const Estimate& worst = worst_of(estimates, chosen);
     GridChoice choice;
     choice.cell = scene.specimen.size.minCoeff() / chosen;
@@ -168,10 +178,11 @@ GridChoice choose_grid(const Scene& scene, double error) {
     choice.quantity = worst.name;
     choice.seconds = trials.back().seconds * std::pow(chosen / trials.back().cells, power_of_time);
     choice.seconds_spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    choice.text = fmt::format("{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "
-                              "from grid to grid, going with the power {:.2g} of the cell\n{:<15} about {:.2g} s for the whole run\n",
-                              "error", 100 * choice.error, choice.quantity, 100 * error, "", chosen, worst.power, "", choice.seconds);
+    choice.text = fmt::format(
+        "{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "
+        "from grid to grid, going with the power {:.2g} of the cell\n{:<15} about {:.2g} s for the whole run\n",
+        "error", 100 * choice.error, choice.quantity, 100 * error, "", chosen, worst.power, "", choice.seconds);
     return choice;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -38,7 +38,7 @@ void run_both(bool side_by_side, const First& first, const Second& second) {
     other.get();
 }
 
-} // namespace
+}  // namespace
 
 GridFactor::GridFactor(int cells_x, int cells_y, int threads) : cells_x_(cells_x), cells_y_(cells_y) {
     while (1 << forks_ < threads && forks_ < most_forks) ++forks_;
@@ -202,7 +202,8 @@ bool GridFactor::eliminate(Box& box) {
             double* below = box.factor.data() + inner;
             cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, border, inner, 1.0, box.factor.data(),
                         leading, below, leading);
-            cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, border, inner, -1.0, below, leading, 1.0, box.left.data(), border);
+            cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, border, inner, -1.0, below, leading, 1.0, box.left.data(),
+                        border);
         }
     }
     for (int k = 0; k < inner; ++k) {
@@ -246,8 +247,9 @@ bool GridFactor::factor_within(int top, int forks, const Assemble& assemble) {
         return true;
     }
     bool first = true, second = true;
-    run_both(boxes_[box.half[0]].stale && boxes_[box.half[1]].stale, [&] { first = factor_within(box.half[0], forks - 1, assemble); },
-             [&] { second = factor_within(box.half[1], forks - 1, assemble); });
+    run_both(
+        boxes_[box.half[0]].stale && boxes_[box.half[1]].stale, [&] { first = factor_within(box.half[0], forks - 1, assemble); },
+        [&] { second = factor_within(box.half[1], forks - 1, assemble); });
     return first && second && factor_box(box, assemble, scratch);
 }
 
@@ -266,7 +268,8 @@ void GridFactor::upward(int top, int forks, const Visit& visit) const {
         for (int b = first_within(top); b <= top; ++b) visit(b);
         return;
     }
-    run_both(true, [&] { upward(half[0], forks - 1, visit); }, [&] { upward(half[1], forks - 1, visit); });
+    run_both(
+        true, [&] { upward(half[0], forks - 1, visit); }, [&] { upward(half[1], forks - 1, visit); });
     visit(top);
 }
 
@@ -279,11 +282,12 @@ void GridFactor::downward(int top, int forks, const Visit& visit) const {
         return;
     }
     visit(top);
-    run_both(true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
+    run_both(
+        true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
 }
 
-// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at a
-// time: most of the work is to fetch them.
+// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at
+// a time: most of the work is to fetch them.
 void GridFactor::forward_columns(const Eigen::MatrixXd& factor, double* y) {
     const auto rows = factor.rows(), columns = factor.cols();
     for (Eigen::Index c = 0; c < columns;) {
@@ -405,7 +409,8 @@ void GridFactor::solve(Eigen::MatrixXd& right) const {
 bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness) {
     const auto columns = static_cast<Eigen::Index>(equations.size());
     Eigen::MatrixXd yield = Eigen::MatrixXd::Zero(columns, columns);  // Z^T Z
-    std::vector<Eigen::MatrixXd> left(boxes_.size());  // [border x columns] what each leaves for the box that it is a half of; empty: nothing
+    std::vector<Eigen::MatrixXd> left(
+        boxes_.size());  // [border x columns] what each leaves for the box that it is a half of; empty: nothing
     for (std::size_t b = 0; b < boxes_.size(); ++b) {
         const Box& box = boxes_[b];
         const int first = box.inner > 0 ? first_[box.nodes[0]] : 0;
@@ -445,7 +450,8 @@ bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::Matrix
 void GridFactor::take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const {
     if (wide_.empty()) return;
     Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), forward.cols());
-    for (const WidePart& part : wide_) seen.noalias() += part.columns.transpose() * forward.middleRows(part.first, part.columns.rows());
+    for (const WidePart& part : wide_)
+        seen.noalias() += part.columns.transpose() * forward.middleRows(part.first, part.columns.rows());
     const Eigen::MatrixXd change = wide_change_ * seen;
     for (const WidePart& part : wide_) forward.middleRows(part.first, part.columns.rows()).noalias() -= part.columns * change;
 }
@@ -460,4 +466,4 @@ double GridFactor::reciprocal_condition() const {
     return largest > 0.0 ? std::pow(least / largest, 2) : 0.0;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

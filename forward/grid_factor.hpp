@@ -10,9 +10,9 @@ namespace crampfit {
 
 /// Cholesky factor of the symmetric positive definite equations of a grid, of which each couples the unknowns at the nodes of one
 /// cell. The grid is halved again and again (nested dissection, George 1973): of each box of cells the unknowns that no cell
-/// outside it knows are eliminated, and what is left at its border goes to the box that it is a half of (multifrontal method, Duff and Reid
-/// 1983). Boxes none of whose cells has changed keep their part, so that a crack that grows costs the boxes about its tip and
-/// those that hold them: a general sparse factor would be made anew as a whole.
+/// outside it knows are eliminated, and what is left at its border goes to the box that it is a half of (multifrontal method,
+/// Duff and Reid 1983). Boxes none of whose cells has changed keep their part, so that a crack that grows costs the boxes about
+/// its tip and those that hold them: a general sparse factor would be made anew as a whole.
 class GridFactor {
   public:
     /// With several threads the parts of the tree go side by side, with the same bits.
@@ -21,7 +21,8 @@ class GridFactor {
     /// Place of each node in the elimination. Nodes are counted row by row, as cells are.
     const std::vector<int>& places() const { return place_; }
 
-    /// Equations of each node, [nodes]: those from `first` on, `count` of them. Equations are numbered by the places of their nodes.
+    /// Equations of each node, [nodes]: those from `first` on, `count` of them. Equations are numbered by the places of their
+    /// nodes.
     void set_equations(const std::vector<int>& first, const std::vector<int>& count);
 
     /// A stiffness between equations; those below 0 are left out.
@@ -43,8 +44,8 @@ class GridFactor {
     /// Solves for right sides [equations x any number], in place.
     void solve(Eigen::MatrixXd& right) const;
 
-    /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is not
-    /// positive definite.
+    /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is
+    /// not positive definite.
     bool add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness);
 
     /// A cheap estimate of 1 / condition number: (least / largest diagonal entry of the factor) squared.
@@ -53,23 +54,23 @@ class GridFactor {
   private:
     struct Box {
         int parent = -1;
-        std::array<int, 2> half{-1, -1};           // children; none: a leaf
-        std::vector<int> cells;                    // of a leaf
-        std::vector<int> nodes;                    // by place: first those eliminated here, then those at the border
-        int eliminated = 0;                        // how many of the nodes
-        std::array<std::vector<int>, 2> slot;      // [halves][border nodes of the half] where they are in `nodes`
+        std::array<int, 2> half{-1, -1};       // children; none: a leaf
+        std::vector<int> cells;                // of a leaf
+        std::vector<int> nodes;                // by place: first those eliminated here, then those at the border
+        int eliminated = 0;                    // how many of the nodes
+        std::array<std::vector<int>, 2> slot;  // [halves][border nodes of the half] where they are in `nodes`
         bool stale = true;
 
-        std::vector<int> offset;                   // [nodes + 1] where the equations of each begin in the box's front
-        int inner = 0;                             // equations eliminated here
-        int border = 0;                            // equations at the border
-        Eigen::MatrixXd factor;                    // [inner + border x inner] lower triangle, and what is below
-        Eigen::MatrixXd left;                      // [border x border] what is left for the parent, lower triangle
+        std::vector<int> offset;  // [nodes + 1] where the equations of each begin in the box's front
+        int inner = 0;            // equations eliminated here
+        int border = 0;           // equations at the border
+        Eigen::MatrixXd factor;   // [inner + border x inner] lower triangle, and what is below
+        Eigen::MatrixXd left;     // [border x border] what is left for the parent, lower triangle
         double least_pivot = 0, largest_pivot = 0;
     };
 
-    struct Scratch {                 // of one box
-        std::vector<int> local;      // [equations] place in its front
+    struct Scratch {             // of one box
+        std::vector<int> local;  // [equations] place in its front
         std::vector<Element> elements;
     };
 
@@ -93,21 +94,21 @@ class GridFactor {
     void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;
-    int placed_ = 0;                 // nodes that have a place
-    std::vector<Box> boxes_;         // halves before what they are halves of
-    std::vector<int> place_;         // [nodes]
-    std::vector<int> box_of_cell_;   // its leaf
-    std::vector<int> first_, count_; // [nodes] equations
-    int forks_ = 0;                  // levels of the tree at which its halves go side by side
+    int placed_ = 0;                  // nodes that have a place
+    std::vector<Box> boxes_;          // halves before what they are halves of
+    std::vector<int> place_;          // [nodes]
+    std::vector<int> box_of_cell_;    // its leaf
+    std::vector<int> first_, count_;  // [nodes] equations
+    int forks_ = 0;                   // levels of the tree at which its halves go side by side
 
-    // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T) L^-1, where
-    // Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
+    // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T)
+    // L^-1, where Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
     struct WidePart {
-        int first;                   // equation
-        Eigen::MatrixXd columns;     // rows of Z from there on; the others are nil
+        int first;                // equation
+        Eigen::MatrixXd columns;  // rows of Z from there on; the others are nil
     };
-    std::vector<WidePart> wide_;     // of the boxes that hold the equations
-    Eigen::MatrixXd wide_change_;    // W
+    std::vector<WidePart> wide_;   // of the boxes that hold the equations
+    Eigen::MatrixXd wide_change_;  // W
 };
 
-} // namespace crampfit
+}  // namespace crampfit

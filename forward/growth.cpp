@@ -53,7 +53,7 @@ double largest_at(int most, Function function) {
 
 // The angle with the largest G / G_c, both of a short branch.
 double weakest_angle(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
-    constexpr int most = 80;  // [degrees] as far as `branch_intensities` is good
+    constexpr int most = 80;                               // [degrees] as far as `branch_intensities` is good
     const double least_toughness = 1e-3 * load.toughness;  // a void has none: it draws the crack, but the ratio stays finite
     return largest_at(most, [&](double angle) {
         const Vec2 K = branch_intensities(angle, load.K_I, load.K_II);
@@ -75,7 +75,7 @@ double hoop_stress_angle(const CrackTip& tip, const TipLoad& load, const Materia
     });
 }
 
-} // namespace
+}  // namespace
 
 double hoop_stress_angle(double K_I, double K_II) {
     // Erdogan and Sih 1963: K_I sin t + K_II (3 cos t - 1) = 0, solved for tan(t / 2) without a difference of like numbers.
@@ -98,8 +98,9 @@ Vec2 branch_intensities(double angle, double K_I, double K_II) {
                                5.07790, -2.88312, -0.0925, 2.996, -4.059, 1.63, 4.1});
     const double I_II = m * series({-1.5 * pi, 10.0 * pi / 3.0 + p3 / 16.0, -2.0 * pi - 133.0 * p3 / 180.0 + 59.0 * p5 / 1280.0,
                                     12.313906, -7.32433, 1.5793, 4.0216, -6.915, 4.21, 4.56});
-    const double II_I = m * series({0.5 * pi, -4.0 * pi / 3.0 - p3 / 48.0, -2.0 * pi / 3.0 + 13.0 * p3 / 30.0 - 59.0 * p5 / 3840.0,
-                                    -6.176023, 4.44112, -1.5340, -2.0700, 4.684, -3.95, -1.32});
+    const double II_I =
+        m * series({0.5 * pi, -4.0 * pi / 3.0 - p3 / 48.0, -2.0 * pi / 3.0 + 13.0 * p3 / 30.0 - 59.0 * p5 / 3840.0, -6.176023,
+                    4.44112, -1.5340, -2.0700, 4.684, -3.95, -1.32});
     const double II_II = series({1.0, -4.0 - 3.0 * p2 / 8.0, 8.0 / 3.0 + 29.0 * p2 / 18.0 - 5.0 * p4 / 128.0,
                                  -32.0 / 15.0 - 4.0 * p2 / 9.0 - 1159.0 * p4 / 7200.0 + 119.0 * p6 / 15360.0, 10.58254, -4.78511,
                                  -1.8804, 7.280, -7.591, 0.25, 12.5});
@@ -109,16 +110,19 @@ Vec2 branch_intensities(double angle, double K_I, double K_II) {
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
                       double increment) {
     switch (criterion) {
-        case GrowthDirection::straight: return tip.direction;
-        case GrowthDirection::normal_to_opening: return normal_to_opening(tip, load.opening);
-        case GrowthDirection::hoop_stress: {
-            const double angle = materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);
-            return turned(tip.direction, angle).normalized();
-        }
-        case GrowthDirection::energy_release_rate:
-            return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
+    case GrowthDirection::straight:
+        return tip.direction;
+    case GrowthDirection::normal_to_opening:
+        return normal_to_opening(tip, load.opening);
+    case GrowthDirection::hoop_stress: {
+        const double angle =
+            materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);
+        return turned(tip.direction, angle).normalized();
+    }
+    case GrowthDirection::energy_release_rate:
+        return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
     }
     return tip.direction;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

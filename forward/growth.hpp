@@ -16,4 +16,4 @@ Vec2 branch_intensities(double angle, double K_I, double K_II);
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
                       double increment);
 
-} // namespace crampfit
+}  // namespace crampfit

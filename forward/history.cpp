@@ -26,7 +26,7 @@ Eigen::Matrix<double, 3, 2> strain_per_jump(const Vec2& n) {
     return M;
 }
 
-} // namespace
+}  // namespace
 
 History::History(const MaterialMap& materials, const Discretisation& body, PlaneCondition plane)
     : body_(body), plane_strain_(plane == PlaneCondition::strain), cell_(body.layout.cells(), -1) {
@@ -57,7 +57,8 @@ void History::add_wood(const MaterialMap& materials, const std::vector<int>& law
             const Material& material = materials.materials()[k];
             elastic.share += shares[k];
             elastic.poisson_ratio += shares[k] * material.poisson_ratio;
-            mean.coefficients += shares[k] * layered(plane_elasticity(material.youngs_modulus, material.poisson_ratio, plane)).coefficients;
+            mean.coefficients +=
+                shares[k] * layered(plane_elasticity(material.youngs_modulus, material.poisson_ratio, plane)).coefficients;
         }
     }
     if (wood.layers.empty()) return;
@@ -83,7 +84,8 @@ void History::add_wood(const MaterialMap& materials, const std::vector<int>& law
 
 void History::forget_unknown(TipLoad& load, const Vec2& tip, const EnergyReleaseOptions& options) const {
     bool near = false;
-    body_.for_cells_near(tip, (options.outer + options.margin) * body_.layout.cell.maxCoeff(), [&](int c) { near = near || is_in(c); });
+    body_.for_cells_near(tip, (options.outer + options.margin) * body_.layout.cell.maxCoeff(),
+                         [&](int c) { near = near || is_in(c); });
     if (near) load.G = load.K_I = load.K_II = std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -105,7 +107,8 @@ PlaneResponse History::respond(const Layer& layer, const Eigen::Vector3d& strain
 // Of a layer and those after it, which together are one layer to it. With M a the strain of the jump a, strain + (1 - f) M a and
 // strain - f M a are those of a layer of share f and the rest; M^T (difference of stresses) = 0 gives a by Newton's method, and
 // d stress / d strain by eliminating it.
-PlaneResponse History::respond(const Wood& wood, std::size_t number, const Eigen::Vector3d& strain, const double* before, double* now) const {
+PlaneResponse History::respond(const Wood& wood, std::size_t number, const Eigen::Vector3d& strain, const double* before,
+                               double* now) const {
     const Layer& layer = wood.layers[number];
     if (number + 1 == wood.layers.size()) return respond(layer, strain, before, now);
     const auto M = strain_per_jump(wood.normal);
@@ -192,7 +195,8 @@ double History::dissipated() const {
     for (const Wood& wood : woods_)
         for (int p = points.first_of_cell[wood.cell]; p < points.first_of_cell[wood.cell + 1]; ++p)
             for (const Layer& layer : wood.layers)
-                if (layer.law >= 0) sum += points.volume[p] * layer.share * laws_[layer.law].dissipated(&before_[row_of(p) + layer.first]);
+                if (layer.law >= 0)
+                    sum += points.volume[p] * layer.share * laws_[layer.law].dissipated(&before_[row_of(p) + layer.first]);
     return sum;
 }
 
@@ -203,4 +207,4 @@ void History::restore(const State& state) {
     else before_ = state.values;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -10,17 +10,20 @@ namespace crampfit {
 struct EnergyReleaseOptions;
 struct TipLoad;
 
-/// What points of wood that remembers have been through; no others have a row here. Where several woods lie in a cell they act as layers
-/// there, as elastic wood does: with n the normal of the layers, strains of two layers differ by the symmetric part of a (x) n, with the a
-/// that makes the tractions on the boundary between them the same. Each layer has a memory of its own.
+/// What points of wood that remembers have been through; no others have a row here. Where several woods lie in a cell they act as
+/// layers there, as elastic wood does: with n the normal of the layers, strains of two layers differ by the symmetric part of a
+/// (x) n, with the a that makes the tractions on the boundary between them the same. Each layer has a memory of its own.
 ///
-/// A step begins with `go_to`; `respond` may be called any number of times, from several threads for different points; `settle` ends it.
+/// A step begins with `go_to`; `respond` may be called any number of times, from several threads for different points; `settle`
+/// ends it.
 class History {
   public:
     History(const MaterialMap& materials, const Discretisation& body, PlaneCondition plane);
 
     bool is_in(int cell) const { return cell_[cell] >= 0; }
-    bool flows_in_plane(int cell) const { return is_in(cell) && woods_[cell_[cell]].flows; }  // some of it is plastic, in plane strain
+    bool flows_in_plane(int cell) const {
+        return is_in(cell) && woods_[cell_[cell]].flows;
+    }  // some of it is plastic, in plane strain
     int cells() const { return static_cast<int>(woods_.size()); }
     std::size_t bytes() const { return 2 * sizeof(double) * before_.size(); }
 
@@ -37,9 +40,9 @@ class History {
     void settle();
 
     // Of what was settled, with the strain as it was then.
-    Tensor stress(int point, const Eigen::Vector3d& strain) const;   // [Pa]
-    double stored(int point, const Eigen::Vector3d& strain) const;   // [J/m^3]
-    double dissipated() const;                                       // by all points since the start [J]
+    Tensor stress(int point, const Eigen::Vector3d& strain) const;  // [Pa]
+    double stored(int point, const Eigen::Vector3d& strain) const;  // [J/m^3]
+    double dissipated() const;                                      // by all points since the start [J]
 
     struct State {
         double time = 0.0;           // [s]
@@ -58,13 +61,13 @@ class History {
         Eigen::Matrix3d elastic;  // stiffness [Pa]
         double poisson_ratio;
     };
-    struct Wood {                 // of a cell
+    struct Wood {  // of a cell
         int cell;
         std::vector<Layer> layers;
         Vec2 normal;
-        int row;                  // values a point
+        int row;  // values a point
         bool flows;
-        std::size_t first;        // of them
+        std::size_t first;  // of them
     };
     const Wood& wood_of(int point) const { return woods_[cell_[body_.points.cell[point]]]; }
     std::size_t row_of(int point) const {
@@ -72,7 +75,8 @@ class History {
         return wood.first + static_cast<std::size_t>(point - body_.points.first_of_cell[wood.cell]) * wood.row;
     }
     void add_wood(const MaterialMap& materials, const std::vector<int>& laws, PlaneCondition plane, int cell);
-    PlaneResponse respond(const Wood& wood, std::size_t layer, const Eigen::Vector3d& strain, const double* before, double* now) const;
+    PlaneResponse respond(const Wood& wood, std::size_t layer, const Eigen::Vector3d& strain, const double* before,
+                          double* now) const;
     PlaneResponse respond(const Layer& layer, const Eigen::Vector3d& strain, const double* before, double* now) const;
     template <class Visit>
     void for_layers(int point, const Eigen::Vector3d& strain, const Visit& visit) const;
@@ -80,12 +84,12 @@ class History {
     const Discretisation& body_;
     bool plane_strain_;
     std::vector<MemoryLaw> laws_;
-    std::vector<int> cell_;       // [cells] its wood, or -1
+    std::vector<int> cell_;  // [cells] its wood, or -1
     std::vector<Wood> woods_;
     std::vector<double> before_;  // as settled
     std::vector<double> now_;
-    double time_ = 0.0;           // [s]
-    double next_time_ = 0.0;      // [s]
+    double time_ = 0.0;       // [s]
+    double next_time_ = 0.0;  // [s]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

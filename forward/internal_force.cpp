@@ -45,8 +45,8 @@ void InternalForce::sort_cells() {
 }
 
 double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
-    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y C_ss)
-    // q_y^2], shear coupling aside.
+    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y
+    // C_ss) q_y^2], shear coupling aside.
     const Points& points = body_.points;
     const Vec2 moment = body_.layout.point_size().cwiseAbs2() / 12.0;
     const double both = moment.y() * stiffness(0, 0) + moment.x() * stiffness(1, 1) + moment.sum() * stiffness(2, 2);
@@ -61,7 +61,8 @@ Vec2 InternalForce::crosswise(int point, const std::vector<Vec2>& displacement) 
 }
 
 template <int Nodes, int PointsPerCell, bool Rotates>
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
+                                        std::vector<Vec2>* force) const {
     using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
     const Points& points = body_.points;
     std::array<Lane, Nodes> slope_x, slope_y;
@@ -132,7 +133,8 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
 }
 
 template <int PointsPerCell>
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
+                                        std::vector<Vec2>* force) const {
     const auto visit = [&]<int Nodes>() {
         return rotates_ ? visit_whole_cells<Nodes, PointsPerCell, true>(cells, displacement, force)
                         : visit_whole_cells<Nodes, PointsPerCell, false>(cells, displacement, force);
@@ -140,13 +142,19 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
     return body_.layout.degree == 1 ? visit.template operator()<4>() : visit.template operator()<9>();
 }
 
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
+                                        std::vector<Vec2>* force) const {
     switch (body_.layout.per_side) {
-        case 1: return visit_whole_cells<1>(cells, displacement, force);
-        case 2: return visit_whole_cells<4>(cells, displacement, force);
-        case 3: return visit_whole_cells<9>(cells, displacement, force);
-        case 4: return visit_whole_cells<16>(cells, displacement, force);
-        default: return visit_whole_cells<25>(cells, displacement, force);
+    case 1:
+        return visit_whole_cells<1>(cells, displacement, force);
+    case 2:
+        return visit_whole_cells<4>(cells, displacement, force);
+    case 3:
+        return visit_whole_cells<9>(cells, displacement, force);
+    case 4:
+        return visit_whole_cells<16>(cells, displacement, force);
+    default:
+        return visit_whole_cells<25>(cells, displacement, force);
     }
 }
 
@@ -191,9 +199,10 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
     return sum;
 }
 
-// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what the
-// stress, shared as the strain is, puts on the change of B as it is.
-Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const {
+// With B the strain's slope by the nodes' displacements, as the law sees it, and C the law's tangent: sum of V B^T C B, and what
+// the stress, shared as the strain is, puts on the change of B as it is.
+Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement,
+                                                               bool geometric) const {
     using Slope = Eigen::Matrix<double, 3, 8>;
     using Gradients = Eigen::Matrix<double, 4, 8>;
     const SeenStrains seen(body_, *history_, group, displacement, rotates_);
@@ -237,7 +246,8 @@ Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup&
     return sum;
 }
 
-Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
+Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement,
+                                                   bool geometric) const {
     const int cell = body_.points.cell[first];
     if (history_ && history_->is_in(cell)) return remembering_tangent({first, count}, displacement, geometric);
     Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
@@ -246,14 +256,22 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const s
     return sum;
 }
 
-Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const {
+Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
+                                                              bool geometric) const {
     switch (count) {
-        case 1: return tangent_of<1>(first, displacement, geometric);
-        case 4: return tangent_of<4>(first, displacement, geometric);
-        case 9: return tangent_of<9>(first, displacement, geometric);
-        case 16: return tangent_of<16>(first, displacement, geometric);
-        case 25: return tangent_of<25>(first, displacement, geometric);
-        default: return elastic_tangent_of(first, 1, displacement, geometric) + elastic_tangent_of(first + 1, count - 1, displacement, geometric);
+    case 1:
+        return tangent_of<1>(first, displacement, geometric);
+    case 4:
+        return tangent_of<4>(first, displacement, geometric);
+    case 9:
+        return tangent_of<9>(first, displacement, geometric);
+    case 16:
+        return tangent_of<16>(first, displacement, geometric);
+    case 25:
+        return tangent_of<25>(first, displacement, geometric);
+    default:
+        return elastic_tangent_of(first, 1, displacement, geometric) +
+               elastic_tangent_of(first + 1, count - 1, displacement, geometric);
     }
 }
 
@@ -264,7 +282,8 @@ void InternalForce::add_stress(int p, const Mat2& stress, std::vector<Vec2>& for
         force[node[k]] -= body_.points.volume[p] * (stress * Vec2(w.slope_x[k], w.slope_y[k]));
 }
 
-double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement,
+                                        std::vector<Vec2>* force) const {
     double energy = 0.0;
     for (const PointGroup& group : groups) {
         const SeenStrains seen(body_, *history_, group, displacement, rotates_);
@@ -326,4 +345,4 @@ double InternalForce::energy(const std::vector<Vec2>& displacement) const {
     return sum;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -10,8 +10,8 @@
 namespace crampfit {
 
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
-/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side by side; the others,
-/// next to a crack or a cutout, point by point.
+/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side
+/// by side; the others, next to a crack or a cutout, point by point.
 ///
 /// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
 /// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient
@@ -63,10 +63,13 @@ class InternalForce {
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
     template <int Nodes, int PointsPerCell, bool Rotates>
     double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
-    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
+                                                   bool geometric) const;
+    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement,
+                             std::vector<Vec2>* force) const;
     void add_stress(int point, const Eigen::Matrix2d& stress, std::vector<Vec2>& force) const;
-    Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const;
+    Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement,
+                                                    bool geometric) const;
     template <int Count>
     Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
 
@@ -82,4 +85,4 @@ class InternalForce {
     std::vector<Place> first_of_strip_;  // [strips + 1]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -7,8 +7,8 @@
 
 namespace crampfit {
 
-/// A scene at equilibrium, kept for runs with other toughnesses: these share the way of the crack and all equilibria along it, and
-/// take milliseconds where a first run takes seconds. The crack's path is the one that the first toughness gave.
+/// A scene at equilibrium, kept for runs with other toughnesses: these share the way of the crack and all equilibria along it,
+/// and take milliseconds where a first run takes seconds. The crack's path is the one that the first toughness gave.
 ///
 /// Runs with other moduli nearby share them too, to first order: every equilibrium moves by its derivative. Two such runs to
 /// either side give the derivative of all that a record holds, on the path as it is.
@@ -33,8 +33,8 @@ class KeptWalk {
     /// Whether a second grid, with cells twice as wide, takes its share off (Quasistatic).
     bool extrapolates() const { return plan_.extrapolates; }
 
-    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run makes do
-    /// with the equilibria that are known, where it can. One run at a time: others wait.
+    /// Runs `scene`, which differs from the first one by toughness, and, to first order, by those numbers; no frames. A rough run
+    /// makes do with the equilibria that are known, where it can. One run at a time: others wait.
     Record run(const Scene& scene, const SimulateOptions& options, bool rough = false);
 
   private:
@@ -48,4 +48,4 @@ class KeptWalk {
     std::unique_ptr<Quasistatic> walk_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

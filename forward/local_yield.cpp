@@ -9,7 +9,7 @@ namespace crampfit {
 
 namespace {
 
-constexpr double margin = 6.0;       // of the box about the facets, in cells
+constexpr double margin = 6.0;  // of the box about the facets, in cells
 
 // What is cut out. Its sides that are not the specimen's own are held.
 Scene scene_in(const Scene& whole, const Box& box, double cell) {
@@ -46,7 +46,7 @@ void hold_sides(Scene& scene, const Discretisation& body, const Box& box, const 
     if (box.high.y() < size.y() - hair.y()) hold(Side::top, 1, true);
 }
 
-} // namespace
+}  // namespace
 
 // The box on one grid, and the loads of the stations on its nodes.
 struct LocalYield::Solved {
@@ -82,8 +82,8 @@ struct LocalYield::Solved {
     MaterialMap materials;
     Discretisation body;
     std::unique_ptr<Equilibrium> equilibrium;
-    std::vector<std::vector<Vec2>> loads;    // [stations][nodes] of unit forces
-    std::vector<std::vector<Vec2>> states;   // [stations][nodes] [m/N]
+    std::vector<std::vector<Vec2>> loads;   // [stations][nodes] of unit forces
+    std::vector<std::vector<Vec2>> states;  // [stations][nodes] [m/N]
     std::vector<MaterialSlope> numbers;
 };
 
@@ -218,4 +218,4 @@ LocalYield::Slope LocalYield::slope(const std::vector<SlidingBody::Touch>& touch
     return {-0.5 * force.dot(given), std::move(forces)};
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -25,7 +25,7 @@ class LocalYield {
     static constexpr int finer = 4;  // cells a side in place of one
 
     struct Place {
-        int station;     // its share is 1 - share; that of the next one `share`
+        int station;  // its share is 1 - share; that of the next one `share`
         double share;
     };
     bool holds(int facet) const {
@@ -39,8 +39,8 @@ class LocalYield {
 
     /// Slopes by a number of the energy and of the facets' forces, displacements as they are.
     struct Slope {
-        double energy = 0;        // that the yield takes [J / unit]
-        Eigen::VectorXd forces;   // [touches] [N / unit]
+        double energy = 0;       // that the yield takes [J / unit]
+        Eigen::VectorXd forces;  // [touches] [N / unit]
     };
 
     /// With those of the forces, the yield as it is [touches] [N / unit].
@@ -59,4 +59,4 @@ class LocalYield {
     std::shared_ptr<Solved> coarse_, fine_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

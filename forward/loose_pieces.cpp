@@ -30,14 +30,15 @@ std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks
     return piece;
 }
 
-} // namespace
+}  // namespace
 
 LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
                               const std::vector<double>& mass, double heaviest) {
     const std::vector<int> piece = pieces_of(body, cracks, mass);
     if (std::ranges::none_of(cracks.pairs, [&](const FieldPair& pair) {
             return mass[pair.left] > 0.0 && mass[pair.right] > 0.0 && piece[pair.left] != piece[pair.right];
-        })) return {};
+        }))
+        return {};
     // How a component of displacement goes with a piece's ways to move as a whole: along x, along y, and turning.
     const double size = body.layout.size().maxCoeff();
     const auto motion = [&](int field, int axis) {
@@ -90,4 +91,4 @@ LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cra
     return found;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

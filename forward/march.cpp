@@ -53,8 +53,8 @@ std::map<double, bool> ends_of_steps(const Scene& scene, double end) {
 class March {
   public:
     March(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
-        : scene_(scene), plan_(plan), materials_(materials), body_(body), equilibrium_(scene, plan, materials, body, threads), gauges_(scene),
-          tracked_(tracked_tip(scene)) {
+        : scene_(scene), plan_(plan), materials_(materials), body_(body), equilibrium_(scene, plan, materials, body, threads),
+          gauges_(scene), tracked_(tracked_tip(scene)) {
         for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
         for (const Body& rigid : scene.bodies) record_.reactions.push_back({rigid.name, {}});
         record_.cracks.resize(scene.cracks.size());
@@ -117,7 +117,8 @@ class March {
         const Boundary& boundary = equilibrium_.boundary();
         external_work_ += equilibrium_.traction_work() - load_work;
         for (int d = 0; d < boundary.drivers(); ++d)
-            external_work_ += 0.5 * (reactions[d] + equilibrium_.reactions()[d]).dot(boundary.travel(d, time) - boundary.travel(d, from));
+            external_work_ +=
+                0.5 * (reactions[d] + equilibrium_.reactions()[d]).dot(boundary.travel(d, time) - boundary.travel(d, from));
         return true;
     }
 
@@ -159,7 +160,8 @@ class March {
             crack.K_I.push_back(load.K_I);
             crack.K_II.push_back(load.K_II);
         }
-        for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.push_back(equilibrium_.reactions()[d]);
+        for (std::size_t d = 0; d < record_.reactions.size(); ++d)
+            record_.reactions[d].force.push_back(equilibrium_.reactions()[d]);
         record_.series.push_back(row);
         const double kept = row.strain_energy + equilibrium_.dissipated();
         largest_energy_ = std::max({largest_energy_, std::abs(external_work_), kept});
@@ -182,12 +184,15 @@ class March {
     void read_due_probes() {
         const Probes& probes = scene_.output.probes;
         if (record_.probes.size() == probes.instants.size()) return;
-        const double here = probes.by_displacement ? equilibrium_.measured_displacement(equilibrium_.time()) : equilibrium_.time();
+        const double here =
+            probes.by_displacement ? equilibrium_.measured_displacement(equilibrium_.time()) : equilibrium_.time();
         ProbeReading reading = read_probes(probes, body_, equilibrium_.cracks(), equilibrium_.displacements());
-        while (record_.probes.size() < probes.instants.size() && here >= probes.instants[record_.probes.size()] * (1.0 - rounding)) {
+        while (record_.probes.size() < probes.instants.size() &&
+               here >= probes.instants[record_.probes.size()] * (1.0 - rounding)) {
             ProbeReading& due = record_.probes.emplace_back(reading);
             if (last_reading_.moved.empty() || here == last_place_) continue;
-            const double share = std::clamp((probes.instants[record_.probes.size() - 1] - last_place_) / (here - last_place_), 0.0, 1.0);
+            const double share =
+                std::clamp((probes.instants[record_.probes.size() - 1] - last_place_) / (here - last_place_), 0.0, 1.0);
             for (std::size_t i = 0; i < due.moved.size(); ++i)
                 due.moved[i] = last_reading_.moved[i] + share * (reading.moved[i] - last_reading_.moved[i]);
         }
@@ -196,7 +201,8 @@ class March {
     }
 
     Record fail(double time) {
-        const bool plastic = std::any_of(materials_.materials().begin(), materials_.materials().end(), [](const Material& m) { return m.plastic; });
+        const bool plastic = std::any_of(materials_.materials().begin(), materials_.materials().end(),
+                                         [](const Material& m) { return m.plastic; });
         if (record_.series.size() <= 1 && outcome_ == Equilibrium::Outcome::mechanism && !plastic)
             throw InputError(scene_.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
         record_.status = RunStatus::unstable;
@@ -232,11 +238,12 @@ class March {
     double largest_imbalance_ = 0.0;  // [J]
 };
 
-} // namespace
+}  // namespace
 
 std::vector<double> march_times(const Scene& scene, const Plan& plan, const MaterialMap& materials) {
     const double largest = scene.solver.time_step.value_or(plan.end_time / steps_in_run);
-    const double smallest = scene.solver.time_step ? largest : std::min(largest, shortest_relaxation(materials) / steps_in_relaxation);
+    const double smallest =
+        scene.solver.time_step ? largest : std::min(largest, shortest_relaxation(materials) / steps_in_relaxation);
     std::vector<double> times;
     double time = 0.0, step = smallest;
     for (const auto& [end, load_changes] : ends_of_steps(scene, plan.end_time)) {
@@ -257,4 +264,4 @@ Record march(const Scene& scene, const Plan& plan, const MaterialMap& materials,
     return March(scene, plan, materials, body, threads).run(go_on);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -51,7 +51,7 @@ Rectangle rectangle(const Vec2& centre, const Vec2& half, const Vec2& spread) {
     return found;
 }
 
-} // namespace
+}  // namespace
 
 struct MaterialMap::Known {
     std::map<Rectangle, LocalWood> average;
@@ -100,28 +100,33 @@ void MaterialMap::check_radial_direction() const {
     const bool mapped = plan.map && !plan.map->orientation.empty();
     if (plan.rings || given != mapped) return;
     throw InputError(scene_.file.string(), given ? "specimen.radial" : "specimen", plan.file.string(),
-                     given ? "the map of the radial direction in the specimen says it already; leave radial or pith out"
-                           : "orthotropic wood needs its radial direction: give specimen.radial or specimen.pith, or a map of it");
+                     given
+                         ? "the map of the radial direction in the specimen says it already; leave radial or pith out"
+                         : "orthotropic wood needs its radial direction: give specimen.radial or specimen.pith, or a map of it");
 }
 
 void MaterialMap::check_transition(int first) const {
     constexpr int steps = 32;
     for (int k = 1; k < steps; ++k) {
-        const Material wood = transition_wood(materials_[first], materials_[first + 1], scene_.specimen.density_exponents, k / double{steps});
+        const Material wood =
+            transition_wood(materials_[first], materials_[first + 1], scene_.specimen.density_exponents, k / double{steps});
         const auto broken = wood.orthotropic ? broken_rule(*wood.orthotropic) : std::nullopt;
         if (broken)
-            throw InputError(scene_.file.string(), "specimen.density_exponents", fmt::format("transition wood of {:.4g} kg/m^3", wood.density),
-                             broken->rule);
+            throw InputError(scene_.file.string(), "specimen.density_exponents",
+                             fmt::format("transition wood of {:.4g} kg/m^3", wood.density), broken->rule);
     }
 }
 
 void MaterialMap::check_memory(bool graded) const {
     if (graded)
-        throw InputError(scene_.file.string(),
-                         scene_.specimen.rings ? "specimen.rings.transition" : scene_.specimen.picture ? "specimen.between" : "specimen.file",
-                         scene_.specimen.rings ? fmt::format("{:g} mm", scene_.specimen.rings->transition * 1e3) : "transition wood",
-                         "not available with viscoelastic or plastic wood: how such wood goes over into other wood is not known; leave the "
-                         "transition out, or give it a class and a material of its own");
+        throw InputError(
+            scene_.file.string(),
+            scene_.specimen.rings     ? "specimen.rings.transition"
+            : scene_.specimen.picture ? "specimen.between"
+                                      : "specimen.file",
+            scene_.specimen.rings ? fmt::format("{:g} mm", scene_.specimen.rings->transition * 1e3) : "transition wood",
+            "not available with viscoelastic or plastic wood: how such wood goes over into other wood is not known; leave the "
+            "transition out, or give it a class and a material of its own");
     for (const auto& [name, material] : scene_.materials)
         if (orthotropic_ && material.orthotropic)
             throw InputError(scene_.file.string(), "materials." + name + ".kind", "orthotropic",
@@ -129,9 +134,9 @@ void MaterialMap::check_memory(bool graded) const {
 }
 
 LocalWood MaterialMap::mix(int first, int second, double grade) const {
-    const Material material = first == second
-                                  ? materials_[first]
-                                  : transition_wood(materials_[first], materials_[second], scene_.specimen.density_exponents, grade);
+    const Material material =
+        first == second ? materials_[first]
+                        : transition_wood(materials_[first], materials_[second], scene_.specimen.density_exponents, grade);
     LocalWood wood;
     wood.density = material.density;
     wood.toughness = material.toughness;
@@ -263,7 +268,8 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
 
 // Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
 int MaterialMap::samples_a_side(const Vec2& half) const {
-    constexpr double rounding = 1e-6;  // one more sample than twice a whole number of pixels would put some of them on the edges of pixels
+    // One more sample than twice a whole number of pixels would put some of them on the edges of pixels.
+    constexpr double rounding = 1e-6;
     const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_ - rounding)) : 16;
     return std::clamp(fit, 2, 16);
 }
@@ -303,7 +309,7 @@ LocalWood MaterialMap::find_average(const Vec2& centre, const Vec2& half) const 
     const int samples = samples_a_side(half);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
-    double least = 1.0, most = 0.0;                 // latewood: layers lie as it does, whatever the moduli
+    double least = 1.0, most = 0.0;               // latewood: layers lie as it does, whatever the moduli
     for (int j = 0; j < samples; ++j) {
         for (int i = 0; i < samples; ++i) {
             const Vec2 place((2.0 * i + 1.0) / samples - 1.0, (2.0 * j + 1.0) / samples - 1.0);
@@ -345,7 +351,8 @@ Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const L
     return known->second;
 }
 
-Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
+Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average,
+                                        const Vec2& spread) const {
     using Coefficients = LayeredElasticity::Coefficients;
     const int samples = samples_a_side(half);
     const Vec2 normal = average.elasticity.normal;
@@ -359,7 +366,8 @@ Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, co
     const double no_other_wood = orthotropic_ ? 0.01 : 1e-12;  // grain that turns within the cell is none
     const auto is_average = [&](const Coefficients& c) {
         const Coefficients d = c - of_average;
-        return std::max({std::abs(d[0]) / of_average[0], std::abs(d[2]) / of_average[2], std::abs(d[3]) / of_average[3], std::abs(d[1])}) < no_other_wood;
+        return std::max({std::abs(d[0]) / of_average[0], std::abs(d[2]) / of_average[2], std::abs(d[3]) / of_average[3],
+                         std::abs(d[1])}) < no_other_wood;
     };
     if (std::all_of(wood.begin(), wood.end(), is_average)) return {};
     Coefficients mean = Coefficients::Zero();
@@ -370,8 +378,8 @@ Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, co
     turn << nx * nx, ny * ny, nx * ny, ny * ny, nx * nx, -nx * ny, -2.0 * nx * ny, 2.0 * nx * ny, nx * nx - ny * ny;
     const Eigen::Matrix3d C = LayeredElasticity{mean, Vec2::UnitX()}.stiffness();
     const Eigen::Matrix3d more = C - LayeredElasticity{of_average, Vec2::UnitX()}.stiffness();
-    Eigen::RowVector2d stretch = Eigen::RowVector2d::Zero();       // mean of E' b, with b q the strain e_ss of q
-    Eigen::Matrix2d contraction = Eigen::Matrix2d::Zero();         // means of r b and p b
+    Eigen::RowVector2d stretch = Eigen::RowVector2d::Zero();  // mean of E' b, with b q the strain e_ss of q
+    Eigen::Matrix2d contraction = Eigen::Matrix2d::Zero();    // means of r b and p b
     Eigen::Matrix2d bending = Eigen::Matrix2d::Zero();
     for (int k = 0; k < samples * samples; ++k) {
         const double x = spread.x() * half.x() * ((2.0 * (k % samples) + 1.0) / samples - 1.0);
@@ -391,7 +399,7 @@ Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, co
     tractions << C.row(0), C.row(2);
     Eigen::Matrix<double, 3, 2> coupling = tractions.transpose() * contraction;
     coupling.row(1) += share * stretch;
-    Eigen::Matrix2d stiffness;              // of the tractions' own strains
+    Eigen::Matrix2d stiffness;  // of the tractions' own strains
     stiffness << C(0, 0), C(0, 2), C(2, 0), C(2, 2);
     Unevenness found;
     found.coupling = turn.transpose() * coupling;
@@ -400,7 +408,8 @@ Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, co
     return found;
 }
 
-// Samples of a square lattice whose own layers need not run the same way; void has none. `normal` is across layers of different wood.
+// Samples of a square lattice whose own layers need not run the same way; void has none. `normal` is across layers of different
+// wood.
 void MaterialMap::average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                                      LayeredElasticity& mean) const {
     constexpr double as_good_as_parallel = 0.02;  // sine of an angle; taken for straight its square is lost
@@ -432,4 +441,4 @@ void MaterialMap::average_elasticity(const std::vector<LayeredElasticity>& sampl
     mean.coefficients /= count;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

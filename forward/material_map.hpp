@@ -9,20 +9,20 @@ namespace crampfit {
 /// What wood is made of at a place, or on average over an area.
 struct LocalWood {
     LayeredElasticity elasticity;
-    double density = 0;          // [kg/m^3]
-    double toughness = 0;        // [J/m^2]
+    double density = 0;                  // [kg/m^3]
+    double toughness = 0;                // [J/m^2]
     Vec2 poisson_ratios = Vec2::Zero();  // stress out of the plane, in plane strain, per stress along the normal and the layers
-    double filled = 0;           // share of the area that is not void
-    double latewood = 0;         // 0 first material .. 1 last, for pictures
-    bool mixed = false;          // an average over more than one wood
-    int material = -1;           // its number; -1: transition wood, or an average
+    double filled = 0;                   // share of the area that is not void
+    double latewood = 0;                 // 0 first material .. 1 last, for pictures
+    bool mixed = false;                  // an average over more than one wood
+    int material = -1;                   // its number; -1: transition wood, or an average
 
     /// E' = E in plane stress, E / (1 - nu^2) in plane strain, along the layers [Pa].
     double plane_modulus() const { return elasticity.coefficients[0]; }
 };
 
-/// What a part of an area adds to the area's average stiffness, as energy per area of the part. With q (y - y_0) and q (x - x_0) the
-/// displacement gradients in x and y by which those in the part's middle change, and e the strain there (xx, yy, 2 xy), it is
+/// What a part of an area adds to the area's average stiffness, as energy per area of the part. With q (y - y_0) and q (x - x_0)
+/// the displacement gradients in x and y by which those in the part's middle change, and e the strain there (xx, yy, 2 xy), it is
 /// e . stretch e / 2 + e . coupling q + q . bending q / 2.
 struct Unevenness {
     Eigen::Matrix3d stretch = Eigen::Matrix3d::Zero();                           // [Pa]; 0 for the whole area
@@ -37,12 +37,12 @@ struct Unevenness {
 /// layers across its radial direction.
 class MaterialMap {
   public:
-    /// Throws InputError for orthotropic wood without a radial direction, for transition wood with inadmissible constants, and for wood
-    /// that remembers where there is transition or orthotropic wood.
+    /// Throws InputError for orthotropic wood without a radial direction, for transition wood with inadmissible constants, and
+    /// for wood that remembers where there is transition or orthotropic wood.
     explicit MaterialMap(const Scene& scene);
 
-    /// The same wood as a part of the specimen sees it that has its lower left corner there. What rectangles hold on average is found
-    /// once for all such parts, places counting to a thousandth of the rectangle; parts are for one thread at a time.
+    /// The same wood as a part of the specimen sees it that has its lower left corner there. What rectangles hold on average is
+    /// found once for all such parts, places counting to a thousandth of the rectangle; parts are for one thread at a time.
     MaterialMap part(const Vec2& corner) const;
 
     /// At a place. Outside a picture the nearest pixel counts, so that rounding at the edge costs no points.
@@ -55,10 +55,10 @@ class MaterialMap {
     /// area.
     LocalWood average(const Vec2& centre, const Vec2& half) const;
 
-    /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Layers share the strain along them,
-    /// wherever they lie, and the tractions between them are those of the mean strain: the part that q stretches along the layers feels
-    /// the moments of E', r and p (`LayeredElasticity`), the rest the average. Places count with their distance from the middle times
-    /// `spread`, so that the points which integrate the average have the same second moment.
+    /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Layers share the strain along
+    /// them, wherever they lie, and the tractions between them are those of the mean strain: the part that q stretches along the
+    /// layers feels the moments of E', r and p (`LayeredElasticity`), the rest the average. Places count with their distance from
+    /// the middle times `spread`, so that the points which integrate the average have the same second moment.
     Unevenness unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
 
     bool homogeneous() const { return homogeneous_; }
@@ -90,18 +90,18 @@ class MaterialMap {
     LocalWood in_picture(const Vec2& x) const;
 
     const Scene& scene_;
-    std::vector<Material> materials_;           // in the order of labels
-    std::vector<LocalWood> pure_;               // the same, ready made
-    Vec2 picture_offset_ = Vec2::Zero();        // [m]
+    std::vector<Material> materials_;     // in the order of labels
+    std::vector<LocalWood> pure_;         // the same, ready made
+    Vec2 picture_offset_ = Vec2::Zero();  // [m]
     double picture_cos_ = 1.0;
     double picture_sin_ = 0.0;
-    double finest_ = 0.0;                       // size of the finest detail to average over [m]; 0: none
-    Vec2 corner_ = Vec2::Zero();                // of what places count from, in the specimen [m]
-    std::shared_ptr<Known> known_;              // of all parts
+    double finest_ = 0.0;           // size of the finest detail to average over [m]; 0: none
+    Vec2 corner_ = Vec2::Zero();    // of what places count from, in the specimen [m]
+    std::shared_ptr<Known> known_;  // of all parts
     bool is_part_ = false;
     bool homogeneous_ = true;
     bool orthotropic_ = false;
     bool remembers_ = false;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -21,11 +21,11 @@ std::shared_ptr<const Scene> shifted(Scene scene, const std::string& key, double
     return std::make_shared<Scene>(std::move(scene));
 }
 
-} // namespace
+}  // namespace
 
 MaterialSlope::MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body)
-    : step_(step_of(scene, key)), more_scene_(shifted(scene, key, step_)), less_scene_(shifted(scene, key, -step_)), more_(*more_scene_),
-      less_(*less_scene_), body_(&body) {
+    : step_(step_of(scene, key)), more_scene_(shifted(scene, key, step_)), less_scene_(shifted(scene, key, -step_)),
+      more_(*more_scene_), less_(*less_scene_), body_(&body) {
     find_stiffness();
 }
 
@@ -47,7 +47,9 @@ void MaterialSlope::find_stiffness() {
 const Unevenness& MaterialSlope::unevenness(int cell, const PointBox& box) const {
     const auto known = unevenness_.find({cell, box});
     if (known != unevenness_.end()) return known->second;
-    const auto of = [&](const MaterialMap& materials) { return body_->unevenness_of(materials, cell, box, body_->wood_of_cell(materials, cell)); };
+    const auto of = [&](const MaterialMap& materials) {
+        return body_->unevenness_of(materials, cell, box, body_->wood_of_cell(materials, cell));
+    };
     const Unevenness more = of(more_), less = of(less_);
     const double span = 2.0 * step_;
     return unevenness_[{cell, box}] = {(more.stretch - less.stretch) / span, (more.coupling - less.coupling) / span,
@@ -59,4 +61,4 @@ double MaterialSlope::opening_modulus(const Vec2& centre, const Vec2& half, cons
     return (of(more_) - of(less_)) / (2.0 * step_);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

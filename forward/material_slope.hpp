@@ -43,4 +43,4 @@ class MaterialSlope {
     mutable std::map<std::pair<int, PointBox>, Unevenness> unevenness_;  // as they were asked for
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -16,7 +16,9 @@ double trace(const Tensor& t) { return t[0] + t[1] + t[2]; }
 
 Tensor deviator(const Tensor& stress) { return stress - trace(stress) / 3.0 * unit; }
 
-double contract(const Tensor& stress, const Tensor& strain) { return stress.dot(strain); }  // the shear counts twice in the strain
+double contract(const Tensor& stress, const Tensor& strain) {
+    return stress.dot(strain);
+}  // the shear counts twice in the strain
 
 // Of a stress deviator, by von Mises.
 double equivalent(const Tensor& s) { return std::sqrt(1.5 * (s.head<3>().squaredNorm() + 2.0 * s[3] * s[3])); }
@@ -24,7 +26,7 @@ double equivalent(const Tensor& s) { return std::sqrt(1.5 * (s.head<3>().squared
 // The strain whose zz comes first in what is remembered.
 Tensor remembered_strain(const double* state) { return {state[1], state[2], state[0], state[3]}; }
 
-} // namespace
+}  // namespace
 
 IsotropicModuli IsotropicModuli::of(const Material& material) {
     const double E = material.youngs_modulus, nu = material.poisson_ratio;
@@ -55,8 +57,9 @@ ViscoelasticLaw::ViscoelasticLaw(const Material& material) : lasting_(IsotropicM
     prepare(0.0);
 }
 
-// While the strain goes evenly a(t) = b + (a - b) exp(-t / tau) with b = change / x, and the dashpot takes int a C a dt / tau, a sum of
-// three products of a and the change with the factors `lost`; the last one is a small difference where x is small, and a series there.
+// While the strain goes evenly a(t) = b + (a - b) exp(-t / tau) with b = change / x, and the dashpot takes int a C a dt / tau, a
+// sum of three products of a and the change with the factors `lost`; the last one is a small difference where x is small, and a
+// series there.
 void ViscoelasticLaw::prepare(double step) {
     constexpr double small = 0.01;
     tangent_ = lasting_.stiffness();
@@ -82,7 +85,8 @@ Response ViscoelasticLaw::respond(const Tensor& strain, const double* before, do
         const Element& e = elements_[k];
         const Eigen::Map<const Tensor> a(before + 5 + 4 * k);
         const Tensor pull = e.moduli.stress(change);
-        now[4] += e.lost[0] * contract(e.moduli.stress(a), a) + e.lost[1] * contract(pull, a) + e.lost[2] * contract(pull, change);
+        now[4] +=
+            e.lost[0] * contract(e.moduli.stress(a), a) + e.lost[1] * contract(pull, a) + e.lost[2] * contract(pull, change);
         const Tensor spring = e.left * a + e.taken * change;
         Eigen::Map<Tensor>(now + 5 + 4 * k) = spring;
         response.stress += e.moduli.stress(spring);
@@ -92,7 +96,8 @@ Response ViscoelasticLaw::respond(const Tensor& strain, const double* before, do
 
 Tensor ViscoelasticLaw::stress(const Tensor& strain, const double* state) const {
     Tensor sum = lasting_.stress(strain);
-    for (std::size_t k = 0; k < elements_.size(); ++k) sum += elements_[k].moduli.stress(Eigen::Map<const Tensor>(state + 5 + 4 * k));
+    for (std::size_t k = 0; k < elements_.size(); ++k)
+        sum += elements_[k].moduli.stress(Eigen::Map<const Tensor>(state + 5 + 4 * k));
     return sum;
 }
 
@@ -109,7 +114,8 @@ PlasticLaw::PlasticLaw(const Material& material) : moduli_(IsotropicModuli::of(m
 
 double PlasticLaw::flow_stress(double a) const {
     double stress = plasticity_.yield_stress + plasticity_.hardening * a;
-    if (const auto& limit = plasticity_.saturation) stress -= (limit->stress - plasticity_.yield_stress) * std::expm1(-a / limit->strain);
+    if (const auto& limit = plasticity_.saturation)
+        stress -= (limit->stress - plasticity_.yield_stress) * std::expm1(-a / limit->strain);
     return stress;
 }
 
@@ -144,8 +150,8 @@ Response PlasticLaw::respond(const Tensor& strain, const double* before, double*
     const double size = equivalent(trial);
     const double excess = size - flow_stress(before[4]);
     if (excess <= 0.0) return response;
-    // size - 3 G da = flow stress(a + da): the left side less the right falls, and is convex as hardening wears off, so that Newton's
-    // method comes to da from below.
+    // size - 3 G da = flow stress(a + da): the left side less the right falls, and is convex as hardening wears off, so that
+    // Newton's method comes to da from below.
     double da = 0.0;
     for (double off = excess; off > rounding * size;) {
         const double next = da + off / (3.0 * moduli_.shear + hardening(before[4] + da));
@@ -163,8 +169,8 @@ Response PlasticLaw::respond(const Tensor& strain, const double* before, double*
     const double G = moduli_.shear;
     const double turning = 2.0 * G * da / size;  // times 3/2 (I - ...) of the change of the trial deviator
     const IsotropicModuli kept{moduli_.bulk, G * (1.0 - 1.5 * turning)};
-    response.tangent = kept.stiffness() -
-                       4.0 * G * G * (1.0 / (3.0 * G + hardening(now[4])) - da / size) * normal * normal.transpose();
+    response.tangent =
+        kept.stiffness() - 4.0 * G * G * (1.0 / (3.0 * G + hardening(now[4])) - da / size) * normal * normal.transpose();
     return response;
 }
 
@@ -215,7 +221,7 @@ std::variant<ViscoelasticLaw, PlasticLaw> law_of(const Material& material) {
     return PlasticLaw(material);
 }
 
-} // namespace
+}  // namespace
 
 MemoryLaw::MemoryLaw(const Material& material, PlaneCondition plane)
     : law_(law_of(material)), plane_stress_(plane == PlaneCondition::stress) {}
@@ -229,9 +235,11 @@ void MemoryLaw::prepare(double step) {
 }
 
 PlaneResponse MemoryLaw::respond(const Eigen::Vector3d& strain, const double* before, double* now) const {
-    return std::visit([&](const auto& law) {
-        return plane_stress_ ? without_stress_zz(law, strain, before, now) : without_strain_zz(law, strain, before, now);
-    }, law_);
+    return std::visit(
+        [&](const auto& law) {
+            return plane_stress_ ? without_stress_zz(law, strain, before, now) : without_strain_zz(law, strain, before, now);
+        },
+        law_);
 }
 
 Tensor MemoryLaw::stress(const Eigen::Vector3d& strain, const double* state) const {
@@ -246,4 +254,4 @@ double MemoryLaw::dissipated(const double* state) const {
     return std::visit([&](const auto& law) { return law.dissipated(state); }, law_);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

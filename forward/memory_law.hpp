@@ -28,8 +28,8 @@ struct Response {
     Eigen::Matrix4d tangent;  // symmetric [Pa]
 };
 
-/// A spring beside Maxwell elements, a spring and a dashpot in line each. With the strain going evenly over a step the strain a of an
-/// element's spring is exactly
+/// A spring beside Maxwell elements, a spring and a dashpot in line each. With the strain going evenly over a step the strain a
+/// of an element's spring is exactly
 ///     a' = exp(-x) a + (1 - exp(-x)) / x (strain' - strain),   x = step / tau
 /// (Taylor, Pister and Goudreau 1970, eq. 12; Simo and Hughes 1998, sec. 10.3).
 /// Remembers: strain zz, xx, yy, 2 xy; what the dashpots have taken [J/m^3]; a of each element.
@@ -48,14 +48,14 @@ class ViscoelasticLaw {
   private:
     struct Element {
         IsotropicModuli moduli;
-        double tau;                       // [s]
-        double left = 1.0, taken = 1.0;   // of a before the step, and of the strain's change in it
-        std::array<double, 3> lost{};     // of the quadratic form of moduli: by a with a, a with the change, the change with itself
+        double tau;                      // [s]
+        double left = 1.0, taken = 1.0;  // of a before the step, and of the strain's change in it
+        std::array<double, 3> lost{};  // of the quadratic form of moduli: by a with a, a with the change, the change with itself
     };
     IsotropicModuli lasting_;
-    double instantaneous_;                // K + 4/3 G [Pa]
+    double instantaneous_;  // K + 4/3 G [Pa]
     std::vector<Element> elements_;
-    Eigen::Matrix4d tangent_;             // the same for all points
+    Eigen::Matrix4d tangent_;  // the same for all points
 };
 
 /// J2 plasticity by radial return (Simo and Taylor 1985; Simo and Hughes 1998, box 3.2), rate-independent.
@@ -108,4 +108,4 @@ class MemoryLaw {
     bool plane_stress_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

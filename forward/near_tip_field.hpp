@@ -8,11 +8,11 @@
 namespace crampfit {
 
 /// Elastic fields around a tip of a straight crack with free faces in wood of any plane compliance, for K_I = 1 and for K_II = 1
-/// [Pa sqrt(m)] (Sih, Paris and Irwin 1965, eqs. 20-23; Lekhnitskii's complex variables z_k = x + s_k y). The tip is the origin, x
-/// goes ahead of it. Angles beyond +-pi go on smoothly into the other face's side.
+/// [Pa sqrt(m)] (Sih, Paris and Irwin 1965, eqs. 20-23; Lekhnitskii's complex variables z_k = x + s_k y). The tip is the origin,
+/// x goes ahead of it. Angles beyond +-pi go on smoothly into the other face's side.
 ///
-/// The published form divides by s_1 - s_2 and fails for isotropic wood, where s_1 = s_2 = i. Here each such quotient is a divided
-/// difference [g] = (g(s_1) - g(s_2)) / (s_1 - s_2), with [f g] = [f] g(s_1) + f(s_2) [g], and for g = z^-1/2
+/// The published form divides by s_1 - s_2 and fails for isotropic wood, where s_1 = s_2 = i. Here each such quotient is a
+/// divided difference [g] = (g(s_1) - g(s_2)) / (s_1 - s_2), with [f g] = [f] g(s_1) + f(s_2) [g], and for g = z^-1/2
 ///     [g] = -y / ((z_1^1/2 + z_2^1/2) z_1^1/2 z_2^1/2),
 /// which holds for equal roots too: there it is the first term of Williams (1957).
 class NearTipField {
@@ -99,4 +99,4 @@ class NearTipField {
 /// Of wood of this stiffness in x, y, for a crack that runs in this direction.
 NearTipField near_tip_field(const Eigen::Matrix3d& stiffness, const Vec2& ahead);
 
-} // namespace crampfit
+}  // namespace crampfit

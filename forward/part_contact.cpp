@@ -9,15 +9,16 @@ namespace crampfit {
 namespace {
 
 constexpr int steps_between_searches = 10;
-constexpr double search_margin = 1.0;  // in cells; parts move by far less between two searches
+constexpr double search_margin = 1.0;     // in cells; parts move by far less between two searches
 constexpr int neighbours_looked_at = 12;  // each way along the outline from the facet that was nearest a step ago
 
 // Stiffness of a facet over that of one cell of its wood, where the time step allows it.
 constexpr double stiffness_in_cells = 10.0;
 
-} // namespace
+}  // namespace
 
-PartContact::PartContact(const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared) : body_(body) {
+PartContact::PartContact(const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared)
+    : body_(body) {
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets) {
         Segment segment;
@@ -32,8 +33,8 @@ PartContact::PartContact(const Discretisation& body, const std::vector<double>& 
     soften(mass, most_frequency_squared);
 }
 
-// What the facets of a node add to its stiffness is bounded by the sum of their springs' shares. A spring joins two nodes, and each of
-// them has springs of both parts' facets: a quarter of what is allowed is each facet's own.
+// What the facets of a node add to its stiffness is bounded by the sum of their springs' shares. A spring joins two nodes, and
+// each of them has springs of both parts' facets: a quarter of what is allowed is each facet's own.
 void PartContact::soften(const std::vector<double>& mass, double most_frequency_squared) {
     const int nodes = body_.layout.nodes_per_cell();
     std::vector<double> added(mass.size(), 0.0);
@@ -79,7 +80,9 @@ void PartContact::find_candidates() {
     }
     near_.clear();
     for (int i = 0; i < static_cast<int>(segments_.size()); ++i) {
-        const auto holds_it = [&](const Box& box) { return &box != &box_[segments_[i].part] && box.contains(segments_[i].end[0]); };
+        const auto holds_it = [&](const Box& box) {
+            return &box != &box_[segments_[i].part] && box.contains(segments_[i].end[0]);
+        };
         if (std::any_of(box_.begin(), box_.end(), holds_it)) near_.push_back(i);
     }
     candidates_.clear();
@@ -104,7 +107,8 @@ void PartContact::touch(Candidate& candidate, std::vector<Vec2>& force) {
     const Vec2 x = 0.5 * (own.end[0] + own.end[1]);
     const int count = static_cast<int>(segments_.size());
     double nearest = std::numeric_limits<double>::infinity(), along = 0.0;
-    for (int j = std::max(0, candidate.nearest - neighbours_looked_at), last = std::min(count - 1, candidate.nearest + neighbours_looked_at);
+    for (int j = std::max(0, candidate.nearest - neighbours_looked_at),
+             last = std::min(count - 1, candidate.nearest + neighbours_looked_at);
          j <= last; ++j) {
         double place = 0.0;
         const double distance = segments_[j].part == own.part ? nearest : distance_squared(j, x, place);
@@ -142,4 +146,4 @@ void PartContact::push(const std::vector<Vec2>& displacement, std::vector<Vec2>&
     for (Candidate& candidate : candidates_) touch(candidate, force);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

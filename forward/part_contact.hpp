@@ -6,13 +6,14 @@
 
 namespace crampfit {
 
-/// Parts of the specimen push on one another without friction. Each facet of one part that lies in another is pushed out of it to the
-/// nearest place of its outline, by a force that grows with the depth, and that place is pushed back. Both parts of a pair do this with
-/// half of the stiffness, so that the force does not depend on which is called first; it is the slope of a potential, and takes no
-/// energy.
+/// Parts of the specimen push on one another without friction. Each facet of one part that lies in another is pushed out of it to
+/// the nearest place of its outline, by a force that grows with the depth, and that place is pushed back. Both parts of a pair do
+/// this with half of the stiffness, so that the force does not depend on which is called first; it is the slope of a potential,
+/// and takes no energy.
 class PartContact {
   public:
-    /// The springs add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields of these masses [kg].
+    /// The springs add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields of these masses
+    /// [kg].
     PartContact(const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared);
 
     /// Adds the contact forces to the nodes.
@@ -48,4 +49,4 @@ class PartContact {
     double stored_energy_ = 0.0;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -22,8 +22,9 @@ namespace {
 // sees a false strain of half the turn's square, 1e-4, against the 0.02 at which earlywood cracks.
 constexpr double most_rotation = 0.03;
 
-// The same where the motion is that at which a crack is expected to run through. It is little more than a guess and hangs on the toughness, so
-// that runs of a fit could fall to both sides: small strain goes further, and the record says by how much the force would change.
+// The same where the motion is that at which a crack is expected to run through. It is little more than a guess and hangs on the
+// toughness, so that runs of a fit could fall to both sides: small strain goes further, and the record says by how much the force
+// would change.
 constexpr double most_expected_rotation = 0.06;
 
 // Loading that takes this many transits of a wave is taken for equilibrium: inertia then adds its inverse square to the energy.
@@ -56,11 +57,16 @@ bool starts_in_motion(const Scene& scene) {
 
 const char* name_of(VelocityUpdate update) {
     switch (update) {
-        case VelocityUpdate::automatic: break;
-        case VelocityUpdate::flip: return "flip";
-        case VelocityUpdate::pic: return "pic";
-        case VelocityUpdate::xpic: return "xpic";
-        case VelocityUpdate::fmpm: return "fmpm";
+    case VelocityUpdate::automatic:
+        break;
+    case VelocityUpdate::flip:
+        return "flip";
+    case VelocityUpdate::pic:
+        return "pic";
+    case VelocityUpdate::xpic:
+        return "xpic";
+    case VelocityUpdate::fmpm:
+        return "fmpm";
     }
     return "auto";
 }
@@ -71,25 +77,31 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
         refuse(scene, "solver.shape_function", "bspline2",
                "not available at equilibrium; use \"auto\", \"gimp\", \"cpdi\" or \"linear\", or solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.velocity_update != VelocityUpdate::automatic)
-        refuse(scene, "solver.velocity_update", name_of(scene.solver.velocity_update), "equilibrium has no velocities to update; leave it out");
+        refuse(scene, "solver.velocity_update", name_of(scene.solver.velocity_update),
+               "equilibrium has no velocities to update; leave it out");
     if (quasistatic && scene.solver.stress_update != StressUpdate::last)
-        refuse(scene, "solver.stress_update", scene.solver.stress_update == StressUpdate::first ? "first" : "average", "equilibrium has no time step; leave it out");
+        refuse(scene, "solver.stress_update", scene.solver.stress_update == StressUpdate::first ? "first" : "average",
+               "equilibrium has no time step; leave it out");
     if (quasistatic && (starts_in_motion(scene) || scene.specimen.parts.size() > 1))
-        refuse(scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
-               "parts that start with a velocity or push on one another are for explicit dynamics; give solver.kind = \"explicit\"");
+        refuse(
+            scene, "specimen.parts", fmt::format("{} parts", scene.specimen.parts.size()),
+            "parts that start with a velocity or push on one another are for explicit dynamics; give solver.kind = \"explicit\"");
     if (quasistatic && scene.solver.damping > 0.0)
-        refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping), "equilibrium has no motion to damp; leave it out");
+        refuse(scene, "solver.damping", fmt::format("{} 1/s", scene.solver.damping),
+               "equilibrium has no motion to damp; leave it out");
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
         const Crack& crack = scene.cracks[k];
         const std::string key = "cracks." + std::to_string(k);
         if (crack.direction == GrowthDirection::energy_release_rate && crack.grows != Growth::none && orthotropic)
             refuse(scene, key + ".direction", "energy release rate",
-                   "not available in orthotropic wood, for whose branches no solution is built in; use \"hoop stress\", \"normal to opening\" or \"straight\"");
+                   "not available in orthotropic wood, for whose branches no solution is built in; use \"hoop stress\", \"normal "
+                   "to opening\" or \"straight\"");
     }
     for (const Body& body : scene.bodies)
         if (!quasistatic && (body.free[0] || body.free[1]))
             refuse(scene, "bodies." + body.name + ".velocity", "free",
-                   "a body that follows a force has no mass to move with in explicit dynamics; use solver.kind = \"quasistatic\", or give its velocity");
+                   "a body that follows a force has no mass to move with in explicit dynamics; use solver.kind = "
+                   "\"quasistatic\", or give its velocity");
 }
 
 // Highest squared frequency that any point can take part in: with the point as an element of its own, its stiffness over its
@@ -155,8 +167,7 @@ double end_time(const Scene& scene) {
 double farthest_motion(const Scene& scene, double end) {
     double farthest = 0.0;
     const auto consider = [&](const auto& driver) {
-        if (speed_of(driver) > 0.0)
-            farthest = std::max(farthest, speed_of(driver) * std::min(end, driver.until.value_or(end)));
+        if (speed_of(driver) > 0.0) farthest = std::max(farthest, speed_of(driver) * std::min(end, driver.until.value_or(end)));
     };
     std::for_each(scene.edges.begin(), scene.edges.end(), consider);
     std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
@@ -178,9 +189,9 @@ double splitting_motion(const Scene& scene, const Discretisation& body) {
 
 // What moves, how fast, until when.
 struct Travel {
-    double fastest = 0.0;                                      // [m/s]
-    double until = std::numeric_limits<double>::infinity();    // all stand still from then on [s]
-    bool together = true;                                      // until the same time
+    double fastest = 0.0;                                    // [m/s]
+    double until = std::numeric_limits<double>::infinity();  // all stand still from then on [s]
+    bool together = true;                                    // until the same time
 };
 
 Travel travel_of(const Scene& scene) {
@@ -201,30 +212,37 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
-// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A / mu,
-// against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
+// FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A
+// / mu, against 4 of a leapfrog: less by 2 m as A, between 0 and 1, comes near 0.
 void choose_updates(const Scene& scene, Plan& plan) {
     const SolverChoice& solver = scene.solver;
     std::string how = "kept by the grid";
     std::string why = "points stay in their cells: mapping to points and back would only lose";
     if (solver.velocity_update != VelocityUpdate::automatic) why = "asked for in solver.velocity_update";
     switch (solver.velocity_update) {
-        case VelocityUpdate::automatic: break;
-        case VelocityUpdate::flip: how = fmt::format("FLIP, {:g} of it PIC", solver.pic_share); break;
-        case VelocityUpdate::pic:
-            how = "PIC, time step shorter by the root of 2";
-            plan.time_step /= std::sqrt(2.0);
-            break;
-        case VelocityUpdate::xpic: how = fmt::format("XPIC({})", solver.order); break;
-        case VelocityUpdate::fmpm:
-            how = fmt::format("FMPM({}), time step shorter by the root of twice its order", solver.order);
-            plan.time_step /= std::sqrt(2.0 * solver.order);
-            break;
+    case VelocityUpdate::automatic:
+        break;
+    case VelocityUpdate::flip:
+        how = fmt::format("FLIP, {:g} of it PIC", solver.pic_share);
+        break;
+    case VelocityUpdate::pic:
+        how = "PIC, time step shorter by the root of 2";
+        plan.time_step /= std::sqrt(2.0);
+        break;
+    case VelocityUpdate::xpic:
+        how = fmt::format("XPIC({})", solver.order);
+        break;
+    case VelocityUpdate::fmpm:
+        how = fmt::format("FMPM({}), time step shorter by the root of twice its order", solver.order);
+        plan.time_step /= std::sqrt(2.0 * solver.order);
+        break;
     }
     plan.choices.push_back({"velocities", how, why});
     if (solver.stress_update != StressUpdate::last)
-        plan.choices.push_back({"stresses", solver.stress_update == StressUpdate::first ? "updated first" : "updated first and last by half a step each",
-                                "asked for in solver.stress_update"});
+        plan.choices.push_back(
+            {"stresses",
+             solver.stress_update == StressUpdate::first ? "updated first" : "updated first and last by half a step each",
+             "asked for in solver.stress_update"});
 }
 
 void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials, const Discretisation& body) {
@@ -234,15 +252,18 @@ void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials
     }
     std::string kinds;
     for (const auto& [name, material] : scene.materials)
-        if (material.remembers()) kinds += fmt::format("{}{} is {}", kinds.empty() ? "" : ", ", name, material.plastic ? "plastic" : "viscoelastic");
+        if (material.remembers())
+            kinds += fmt::format("{}{} is {}", kinds.empty() ? "" : ", ", name, material.plastic ? "plastic" : "viscoelastic");
     const History history(materials, body, scene.model.plane);
-    plan.choices.push_back({"history", fmt::format("in {} of {} cells, {:.3g} MB", history.cells(), body.layout.cells(), static_cast<double>(history.bytes()) * 1e-6),
+    plan.choices.push_back({"history",
+                            fmt::format("in {} of {} cells, {:.3g} MB", history.cells(), body.layout.cells(),
+                                        static_cast<double>(history.bytes()) * 1e-6),
                             kinds + "; woods that share a cell act as layers, each with a memory of its own"});
     plan.choices.push_back({"dissipation", "beside the strain energy, which is what comes back",
                             "external work = strain + kinetic + fracture energy + what wood, damping and friction dissipate"});
 }
 
-} // namespace
+}  // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
     Plan plan;
@@ -268,8 +289,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         plan.free_bodies |= rigid.free[0] || rigid.free[1];
     }
     plan.quasistatic = scene.solver.kind == SolverKind::quasistatic ||
-                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) && !bridged &&
-                        (plan.slowness > slow_loading || plan.free_bodies));
+                       (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
+                        !bridged && (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     plan.remembers = materials.remembers();
     check_memory(scene, plan.quasistatic, materials, body);
@@ -287,15 +308,23 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.rotates = chosen ? scene.solver.strain == StrainMeasure::finite_rotation : expected > bound * smallest;
     plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && !plan.remembers && travel.together;
     if (plan.quasistatic && !plan.linear && (plan.driven || plan.remembers) && !std::isfinite(plan.end_time))
-        refuse(scene, "stop", "crack_length alone", "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
-                                                    "the load may go");
-    const std::string why = scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
-        : plan.free_bodies ? "a body that follows a force is in equilibrium with the specimen"
+        refuse(scene, "stop", "crack_length alone",
+               "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "
+               "the load may go");
+    const std::string why =
+        scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
+        : plan.free_bodies                         ? "a body that follows a force is in equilibrium with the specimen"
         : bridged ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
-        : starts_in_motion(scene) ? "a part starts in motion"
-        : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness, slow_loading);
+        : starts_in_motion(scene)
+            ? "a part starts in motion"
+            : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness,
+                          slow_loading);
     if (plan.quasistatic)
-        choose("solver", plan.linear ? "equilibrium, linear" : plan.remembers ? "equilibrium in steps of time, Newton's method" : "equilibrium, Newton's method", why);
+        choose("solver",
+               plan.linear      ? "equilibrium, linear"
+               : plan.remembers ? "equilibrium in steps of time, Newton's method"
+                                : "equilibrium, Newton's method",
+               why);
     else choose("solver", "explicit dynamics", why);
     double least_advance = std::numeric_limits<double>::infinity();
     for (const Crack& crack : scene.cracks)
@@ -306,14 +335,19 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
-               plan.extrapolates       ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
-               : plan.remembers        ? "wood that remembers: errors of time and of the grid do not go together"
-               : may_meet              ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
-               : scene.solver.extrapolate ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`", least_coarse_cells)
-                                          : "solver.extrapolate is false");
-    if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) && least_advance > 0.0)
+               plan.extrapolates ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
+               : plan.remembers  ? "wood that remembers: errors of time and of the grid do not go together"
+               : may_meet
+                   ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
+               : scene.solver.extrapolate
+                   ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`",
+                                 least_coarse_cells)
+                   : "solver.extrapolate is false");
+    if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) &&
+        least_advance > 0.0)
         choose("tips near sharp boundaries", "boxes with finer cells around them",
-               "a tip that passes into wood many times as stiff releases hardly any energy within a cell: the grid alone takes it for much");
+               "a tip that passes into wood many times as stiff releases hardly any energy within a cell: the grid alone takes "
+               "it for much");
     choose("reference", "undeformed specimen (total Lagrangian)",
            "points stay in their cells: no cell crossing, and grid velocities need no mapping to points and back");
     if (scene.solver.shape_function == ShapeFunction::bspline2)
@@ -321,36 +355,52 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else
         choose("shape function", name_of(scene.solver.shape_function),
                "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
-    choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
-           chosen ? "asked for in solver.strain"
-                  : fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
-                                expected / smallest, bound));
+    choose(
+        "strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
+        chosen
+            ? "asked for in solver.strain"
+            : fmt::format(
+                  "edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
+                  expected / smallest, bound));
     const std::string kind = materials.orthotropic() ? "orthotropic" : "isotropic";
-    choose("material", materials.homogeneous() ? "one " + kind + " material" : kind + " wood by place; points that a boundary crosses act as layers",
+    choose("material",
+           materials.homogeneous() ? "one " + kind + " material"
+                                   : kind + " wood by place; points that a boundary crosses act as layers",
            !materials.homogeneous()  ? "band widths do not round to points; J carries the material-gradient term"
            : materials.orthotropic() ? "one radial direction"
                                      : "no orientation");
     choose_history(scene, plan, materials, body);
 
     if (scene.cracks.empty()) choose("crack fields", "none", "no crack");
-    else choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
-                std::string("two fields at nodes whose support a crack cuts, ") +
-                    (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere");
+    else
+        choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
+               std::string("two fields at nodes whose support a crack cuts, ") +
+                   (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere");
     if (!scene.cracks.empty())
-        choose("J, K", plan.remembers ? "at saved instants; not a number where wood within 5.5 cells of the tip remembers" : !plan.grows ? "at saved instants" : plan.quasistatic ? "at each place of the tip" : "at saved instants and where a crack turns; it grows by the energy that the ties at its tip give up", "domain form, 4 cells around the tip");
+        choose("J, K",
+               plan.remembers ? "at saved instants; not a number where wood within 5.5 cells of the tip remembers"
+               : !plan.grows  ? "at saved instants"
+               : plan.quasistatic
+                   ? "at each place of the tip"
+                   : "at saved instants and where a crack turns; it grows by the energy that the ties at its tip give up",
+               "domain form, 4 cells around the tip");
     const int tips = growing_tips(scene);
     if (plan.quasistatic && tips > 1)
         choose("growth", fmt::format("{} tips compete", tips),
-               "the tip moves whose next advance pays for itself at the least load, tips that nothing tells apart together; which one "
+               "the tip moves whose next advance pays for itself at the least load, tips that nothing tells apart together; "
+               "which one "
                "depends on the toughness, so that each other toughness needs a run of its own");
     const bool parts_touch = scene.specimen.parts.size() > 1;
-    if (parts_touch) choose("parts", fmt::format("{}, which push on one another without friction", scene.specimen.parts.size()), "given in specimen.parts");
+    if (parts_touch)
+        choose("parts", fmt::format("{}, which push on one another without friction", scene.specimen.parts.size()),
+               "given in specimen.parts");
     choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
     if (plan.friction)
-        choose("friction", "Coulomb, of bodies or crack faces that press", plan.quasistatic
-               ? "slip counts from one equilibrium to the next; Newton's method takes its unsymmetric tangent by iteration on the symmetric part"
-               : "asked for");
+        choose("friction", "Coulomb, of bodies or crack faces that press",
+               plan.quasistatic ? "slip counts from one equilibrium to the next; Newton's method takes its unsymmetric tangent "
+                                  "by iteration on the symmetric part"
+                                : "asked for");
     if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;
 
@@ -371,14 +421,17 @@ int growing_tips(const Scene& scene) {
 std::string describe(const Scene& scene, const Plan& plan, const Discretisation& body) {
     std::string text;
     if (!scene.title.empty()) text += scene.title + "\n";
-    for (const auto& [part, choice, reason] : plan.choices) text += fmt::format("{:<15} {}\n{:<15}   because: {}\n", part, choice, "", reason);
+    for (const auto& [part, choice, reason] : plan.choices)
+        text += fmt::format("{:<15} {}\n{:<15}   because: {}\n", part, choice, "", reason);
     text += fmt::format("{:<15} {} x {} cells of {:.4g} x {:.4g} mm, {} points, {} nodes\n", "grid", body.layout.cells_x,
                         body.layout.cells_y, body.layout.cell.x() * 1e3, body.layout.cell.y() * 1e3, body.points.count(),
                         body.layout.nodes());
     if (plan.quasistatic) {
         const double seconds = body.layout.nodes() * seconds_per_node * std::sqrt(static_cast<double>(body.layout.nodes()));
         text += fmt::format("{:<15} about {:.2g} s on one core for an equilibrium{}\n", "cost", seconds,
-                            plan.remembers ? fmt::format(", of which there are {} or more in time", march_times(scene, plan, MaterialMap(scene)).size()) : "");
+                            plan.remembers ? fmt::format(", of which there are {} or more in time",
+                                                         march_times(scene, plan, MaterialMap(scene)).size())
+                                           : "");
         return text;
     }
     text += fmt::format("{:<15} {:.4g} us\n", "time step", plan.time_step * 1e6);
@@ -394,4 +447,4 @@ std::string describe(const Scene& scene, const Plan& plan, const Discretisation&
     return text;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

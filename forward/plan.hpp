@@ -9,21 +9,21 @@ namespace crampfit {
 
 /// What this scene needs, decided once. Nothing that it leaves out is allocated or looped over.
 struct Plan {
-    bool quasistatic = false;   // equilibrium; else explicit dynamics
-    bool linear = false;        // equilibrium goes linearly with the load
-    bool extrapolates = false;  // a second grid, twice as coarse, tells and takes off most of the grid's error
-    bool driven = false;        // some edge or body moves
-    double still_from = 0;      // when everything that moves has come to its end [s]; infinite: never
-    bool rotates = false;       // finite rotation; else small strain
-    bool grows = false;         // some tip may grow
-    bool contact = false;       // some body can touch and slide
-    bool friction = false;      // some body or closed crack faces rub: a state hangs on the way to it
-    bool remembers = false;     // some wood is viscoelastic or plastic: a state hangs on the way to it
-    bool free_bodies = false;   // some body follows a force
-    double time_step = 0;       // [s]
+    bool quasistatic = false;            // equilibrium; else explicit dynamics
+    bool linear = false;                 // equilibrium goes linearly with the load
+    bool extrapolates = false;           // a second grid, twice as coarse, tells and takes off most of the grid's error
+    bool driven = false;                 // some edge or body moves
+    double still_from = 0;               // when everything that moves has come to its end [s]; infinite: never
+    bool rotates = false;                // finite rotation; else small strain
+    bool grows = false;                  // some tip may grow
+    bool contact = false;                // some body can touch and slide
+    bool friction = false;               // some body or closed crack faces rub: a state hangs on the way to it
+    bool remembers = false;              // some wood is viscoelastic or plastic: a state hangs on the way to it
+    bool free_bodies = false;            // some body follows a force
+    double time_step = 0;                // [s]
     double added_frequency_squared = 0;  // what contact and ties may add to the highest squared frequency [1/s^2]
-    double end_time = 0;        // when a stop condition on time or displacement is met [s]; infinite: none is
-    double slowness = 0;        // transits of the specimen by a wave while the load is applied
+    double end_time = 0;                 // when a stop condition on time or displacement is met [s]; infinite: none is
+    double slowness = 0;                 // transits of the specimen by a wave while the load is applied
 
     struct Choice {
         std::string part;
@@ -41,4 +41,4 @@ int growing_tips(const Scene& scene);
 
 std::string describe(const Scene& scene, const Plan& plan, const Discretisation& body);
 
-} // namespace crampfit
+}  // namespace crampfit

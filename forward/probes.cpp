@@ -28,7 +28,8 @@ std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretis
     return readings;
 }
 
-ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks, const std::vector<Vec2>& displacement) {
+ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
+                         const std::vector<Vec2>& displacement) {
     ProbeReading reading{read_probes(probes, body, cracks, {&displacement}).front(), {}};
     for (const CrackLine& line : cracks.lines) reading.cracks.push_back(line.points);
     return reading;
@@ -57,14 +58,15 @@ double time_at(const Record& record, const SeriesPlace& place) {
     return std::lerp(record.series[place.row].time, record.series[next_row(record, place)].time, place.share);
 }
 
-} // namespace
+}  // namespace
 
 // How much of the way from the station to the next the cracks have gone.
 double WayFinder::share_gone(const Record& record, const SeriesPlace& place) {
     if (walk_.station(station_).left || !walk_.reach(station_ + 1, time_at(record, place))) return 0.0;
     double least = 1.0;
     for (const auto& [crack, at_end, route] : walk_.station(station_).moving) {
-        const double length = std::lerp(length_at(record, crack, place.row), length_at(record, crack, next_row(record, place)), place.share);
+        const double length =
+            std::lerp(length_at(record, crack, place.row), length_at(record, crack, next_row(record, place)), place.share);
         const double here = walk_.station(station_).lengths[crack];
         const double grown = walk_.station(station_ + 1).lengths[crack] - here;
         if (length < here + grown) least = std::min(least, std::max(0.0, (length - here) / grown));
@@ -76,7 +78,8 @@ void WayFinder::to(const Record& record, const SeriesPlace& place) {
     while ((share_ = share_gone(record, place)) == 1.0) ++station_;
 }
 
-Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk)
+Revisit::Revisit(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                 Quasistatic& walk)
     : walk_(walk), finder_(walk), body_(body), equilibrium_(scene, plan, materials, body_) {}
 
 // Moves the tips that move on from the station by this share of the way to the next.
@@ -129,4 +132,4 @@ void read_probes(const Scene& scene, Quasistatic& walk, Record& record) {
     }
 }
 
-} // namespace crampfit
+}  // namespace crampfit

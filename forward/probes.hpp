@@ -5,13 +5,14 @@
 
 namespace crampfit {
 
-/// What probes read in each of some displacement fields [fields x readings] [m]: the displacement of the grid, by its shape functions, of
-/// the fields on the place's own side of each crack.
+/// What probes read in each of some displacement fields [fields x readings] [m]: the displacement of the grid, by its shape
+/// functions, of the fields on the place's own side of each crack.
 std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
                                            const std::vector<const std::vector<Vec2>*>& displacements);
 
 /// The same in one field, with the cracks as they are.
-ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks, const std::vector<Vec2>& displacement);
+ProbeReading read_probes(const Probes& probes, const Discretisation& body, const CrackFields& cracks,
+                         const std::vector<Vec2>& displacement);
 
 /// A place between a row of a record's series and the next.
 struct SeriesPlace {
@@ -42,8 +43,8 @@ class WayFinder {
     double share_ = 0;
 };
 
-/// The equilibria of a walk that a record has rows of. A walk keeps no displacements: each is solved for anew, with the cracks as they
-/// were then.
+/// The equilibria of a walk that a record has rows of. A walk keeps no displacements: each is solved for anew, with the cracks as
+/// they were then.
 class Revisit {
   public:
     /// All of them must outlive this, but for `body`: the specimen at rest, without cracks.
@@ -69,4 +70,4 @@ class Revisit {
 /// interpolation as all else of the series.
 void read_probes(const Scene& scene, Quasistatic& walk, Record& record);
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -15,9 +15,10 @@ namespace {
 // Stations lie this part of a cell apart where no `advance` asks for less: the ties make the energy nearly linear in between.
 constexpr double increment_in_cells = 0.5;
 
-// An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where stations are
-// cheap, in more, and in more still about a narrow peak of the load that the crack needs. With two, latewood of three cells and 30 times as stiff
-// puts fitted toughnesses off by 5 to 10 %, with four by 0.5 (`scripts/virtual_wedges --scene opened --finer --seed 103`).
+// An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where
+// stations are cheap, in more, and in more still about a narrow peak of the load that the crack needs. With two, latewood of
+// three cells and 30 times as stiff puts fitted toughnesses off by 5 to 10 %, with four by 0.5 (`scripts/virtual_wedges --scene
+// opened --finer --seed 103`).
 constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4, least_stations_in_peak = 8;
 
 // Into how many steps the loading of a scene that is not linear is divided.
@@ -37,7 +38,7 @@ Scene with_wide_cells(Scene scene) {
     return scene;
 }
 
-} // namespace
+}  // namespace
 
 struct Quasistatic::Coarse {
     Scene scene;
@@ -46,7 +47,8 @@ struct Quasistatic::Coarse {
     bool side_by_side;  // with the finer grid's
 
     Coarse(const Scene& fine, const Plan& plan, const std::vector<std::string>& numbers, int threads, const Quasistatic& leader)
-        : scene(with_wide_cells(fine)), materials(scene), walk(scene, plan, materials, Discretisation(scene, materials), numbers, threads, &leader), side_by_side(threads > 1) {}
+        : scene(with_wide_cells(fine)), materials(scene),
+          walk(scene, plan, materials, Discretisation(scene, materials), numbers, threads, &leader), side_by_side(threads > 1) {}
 };
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
@@ -61,8 +63,8 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                          const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
-    : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body), equilibrium_(scene, plan, materials, body_, threads),
-      fine_tip_(scene, plan, materials, body_, numbers_) {
+    : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body),
+      equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_) {
     for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -72,7 +74,8 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
         std::size_t ahead = 0;
-        if (crack.advance > 0.0) ahead = std::max<std::size_t>(least_stations, std::lround(std::ceil(crack.advance / cell - 1e-6)));
+        if (crack.advance > 0.0)
+            ahead = std::max<std::size_t>(least_stations, std::lround(std::ceil(crack.advance / cell - 1e-6)));
         const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
         if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
         if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
@@ -100,7 +103,8 @@ std::vector<std::optional<TipBoxes>> Quasistatic::boxes_ahead() const {
         const auto& [crack, at_end, increment, ahead] = growing_[t];
         const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
         if (ahead == 0 || !tip.inside) continue;
-        boxes[t] = fine_tip_.about(equilibrium_.cracks(), crack, tip.position, tip.position + static_cast<double>(ahead) * increment * tip.direction);
+        boxes[t] = fine_tip_.about(equilibrium_.cracks(), crack, tip.position,
+                                   tip.position + static_cast<double>(ahead) * increment * tip.direction);
     }
     return boxes;
 }
@@ -166,7 +170,8 @@ LoadState Quasistatic::load_state(const Missed& missed) const {
     for (const Vec2& r : equilibrium_.reactions()) state.reactions.push_back(ratio(missed.here) * r);
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k)
         for (const bool at_end : {false, true})
-            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end) : TipLoad{});
+            state.tips.push_back(equilibrium_.cracks().lines[k].tip(at_end).inside && !leader_ ? equilibrium_.load_at(k, at_end)
+                                                                                               : TipLoad{});
     return state;
 }
 
@@ -238,7 +243,8 @@ bool Quasistatic::know_linear(std::size_t number) {
     for (const int time : {0, 1, 2}) {
         std::vector<Vec2> u(unloaded.size());
         for (std::size_t f = 0; f < u.size(); ++f) u[f] = (1.0 - 0.5 * time) * unloaded[f] + 0.5 * time * loaded[f];
-        for (std::size_t d = 0; d < moved.size(); ++d) between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
+        for (std::size_t d = 0; d < moved.size(); ++d)
+            between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
         equilibrium_.set_displacements(u, time_of(time), between);
         const Missed missed = missed_at(number, !numbers_.empty());
         keep(number, time, load_state(missed));
@@ -251,9 +257,9 @@ bool Quasistatic::know_linear(std::size_t number) {
     return true;
 }
 
-// Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the one
-// asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to, and
-// when a crack has grown at the same time it falls.
+// Solves for a time from where the equilibrium stands. A body in contact may have several equilibria, some of them absurd: the
+// one asked for is connected to where this starts. At a standing crack the potential grows by what the load's power adds up to,
+// and when a crack has grown at the same time it falls.
 bool Quasistatic::solve_from(double potential, double power, double from, double time) {
     ++equilibria_;
     outcome_ = equilibrium_.solve(time);
@@ -279,7 +285,8 @@ std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& befo
 bool Quasistatic::solve_predicted(std::size_t number, int time) {
     if (plan_.friction) return false;  // a state hangs on the way to it
     int before = places_[number].parent;
-    for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back) before = back < farthest_back ? places_[before].parent : -1;
+    for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back)
+        before = back < farthest_back ? places_[before].parent : -1;
     if (before < 0) return false;
     const std::map<int, Known>& there = places_[before].known;
     const Known* from = nullptr;
@@ -307,7 +314,8 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
     const auto consider = [&](const Known& known, bool before) {
-        if (std::abs(known.time - time) >= nearest || (plan_.friction && known.time > time)) return;  // friction: by loading alone
+        if (std::abs(known.time - time) >= nearest || (plan_.friction && known.time > time))
+            return;  // friction: by loading alone
         nearest = std::abs(known.time - time);
         from = known;
         if (before) from.displacement = handed_on(place.parent, known.displacement, static_cast<int>(number));
@@ -321,13 +329,15 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
         double potential = from.potential;
         double power = from.power;
         bool good = true;
-        if (from.time != time && !place.known.count(from.time) && std::isfinite(from.potential)) {  // growth first, then more load
+        if (from.time != time && !place.known.count(from.time) &&
+            std::isfinite(from.potential)) {  // growth first, then more load
             good = solve_from(potential, power, time_of(from.time), time_of(from.time));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
         for (int part = 1; part <= parts && good; ++part) {
-            good = solve_from(potential, power, equilibrium_.time(), std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            good = solve_from(potential, power, equilibrium_.time(),
+                              std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
@@ -390,8 +400,9 @@ void Quasistatic::forget_guesses() {
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
     const bool at_rest = time == 0 && !equilibrium_.boundary().has_dead_load();
-    const auto [second, good] = on_both_grids([&] { return coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time); },
-                                              [&] { return at_rest || solve_for(number, time); });
+    const auto [second, good] =
+        on_both_grids([&] { return coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time); },
+                      [&] { return at_rest || solve_for(number, time); });
     if (!second) return false;
     if (at_rest) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
@@ -401,7 +412,8 @@ bool Quasistatic::find(std::size_t number, int time) {
     }
     if (good) {
         if (!scene_.output.probes.places.empty()) equilibrium_.refine();
-        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
+        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(),
+                             equilibrium_.contacts()};
         keep(number, time, load_state(missed_at(number, false)));
         keep_probes(number, time);
         return true;
@@ -432,4 +444,4 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
     return station.states.empty() ? nothing(time) : station.at(time);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -15,15 +15,15 @@
 
 namespace crampfit {
 
-/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them equilibria
-/// at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way that the
-/// crack took when it was first followed, so that other toughnesses find most of what they need here.
+/// The way of the cracks through the specimen at equilibrium: stations a part of the `advance` apart, and for each of them
+/// equilibria at some times of the loading, found when they are asked for and kept. Toughness has no part in them but for the way
+/// that the crack took when it was first followed, so that other toughnesses find most of what they need here.
 ///
-/// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there stations
-/// of a linear scene stand closer, whatever the toughness.
+/// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there
+/// stations of a linear scene stand closer, whatever the toughness.
 ///
-/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing tells
-/// apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
+/// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing
+/// tells apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.
 ///
 /// In a linear scene three states say all about a station. Else equilibria are known at even times, and between them by
 /// interpolation.
@@ -38,16 +38,17 @@ class Quasistatic {
                 const std::vector<std::string>& numbers = {}, int threads = 1);
     ~Quasistatic();
 
-    /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0 ln(p / p_0)
-    /// of each number.
+    /// From now on all states are as they would be with the numbers shifted, to first order; the crack's way stays. `by` is p_0
+    /// ln(p / p_0) of each number.
     void shift(const std::vector<double>& by);
 
-    /// From now on states that are not known need not be found where others of the same place are: they follow from these, roughly.
+    /// From now on states that are not known need not be found where others of the same place are: they follow from these,
+    /// roughly.
     void set_rough(bool rough);
 
-    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing tip
-    /// has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which one
-    /// moves. `now` is how far the load has come [s].
+    /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing
+    /// tip has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which
+    /// one moves. `now` is how far the load has come [s].
     bool reach(std::size_t station, double now);
 
     /// The station, with all its states that have been asked for. It must have been reached.
@@ -59,8 +60,8 @@ class Quasistatic {
         double toughness = 0;                                   // that it overcomes: the mean over the route [J/m^2]
     };
 
-    /// When the crack moves on from a station if the wood is as tough as this. Where that was due before `now`, roughly when: from
-    /// what is known already or, `closely`, from a state not long before.
+    /// When the crack moves on from a station if the wood is as tough as this. Where that was due before `now`, roughly when:
+    /// from what is known already or, `closely`, from a state not long before.
     Critical critical(std::size_t station, const MaterialMap& materials, double now, bool closely = false);
 
     /// What a station is like at a time.
@@ -70,52 +71,53 @@ class Quasistatic {
     std::vector<Vec2> probes_at(std::size_t station, double time);
 
     const std::string& failure() const { return failure_; }  // why no equilibrium was found; empty: all were
-    int equilibria() const { return equilibria_; }            // solved for so far, of the finer grid
+    int equilibria() const { return equilibria_; }           // solved for so far, of the finer grid
     long points() const { return body_.points.count(); }
 
   private:
-    struct Known {                                      // an equilibrium of this grid
-        int time;                                       // its number
-        std::vector<Vec2> displacement;                 // [fields] [m]
-        double potential;                               // [J]
-        double power;                                   // [W]
+    struct Known {                       // an equilibrium of this grid
+        int time;                        // its number
+        std::vector<Vec2> displacement;  // [fields] [m]
+        double potential;                // [J]
+        double power;                    // [W]
         Equilibrium::Contacts contacts = {};
     };
-    struct Slopes {                                     // of an equilibrium [numbers]
+    struct Slopes {  // of an equilibrium [numbers]
         std::vector<LoadState> states;
-        std::vector<std::vector<Vec2>> probes;          // [readings] of the scene's [m]; empty: none
+        std::vector<std::vector<Vec2>> probes;  // [readings] of the scene's [m]; empty: none
     };
-    struct Missed {                                     // by the grid where the equilibrium stands
-        MissedEnergy here;                              // seen in the boxes for the advance from there
-        MissedEnergy as_end;                            // and in those for the advance that ends there
+    struct Missed {           // by the grid where the equilibrium stands
+        MissedEnergy here;    // seen in the boxes for the advance from there
+        MissedEnergy as_end;  // and in those for the advance that ends there
     };
     struct GrowingTip {
         int crack;
         bool at_end;
-        double increment;                               // of its crack's length between stations [m]
-        std::size_t ahead;                              // stations that an advance spans
+        double increment;   // of its crack's length between stations [m]
+        std::size_t ahead;  // stations that an advance spans
     };
-    struct Step {                                       // from one place to the next
-        unsigned tips = 0;                              // that go on, a bit each
-        int quarters = 4;                               // of their increment
+    struct Step {           // from one place to the next
+        unsigned tips = 0;  // that go on, a bit each
+        int quarters = 4;   // of their increment
         auto operator<=>(const Step&) const = default;
     };
-    struct Place {                                      // of all tips: on the way, or tried
+    struct Place {  // of all tips: on the way, or tried
         Station station;
         int parent = -1;
-        Step step;                                      // from the parent
-        unsigned inside = 0;                            // growing tips that can go on from here
-        unsigned tips = 0;                              // those of the station's `moving`
-        int further = -1;                               // the place where they have gone an advance on
-        std::map<Step, int> next;                       // places that tips have gone on to from here
-        std::optional<Equilibrium::Snapshot> snapshot;  // to come back to; in a linear scene with a single tip of the last places only
-        std::map<int, Known> known;                     // by number of the time
+        Step step;                 // from the parent
+        unsigned inside = 0;       // growing tips that can go on from here
+        unsigned tips = 0;         // those of the station's `moving`
+        int further = -1;          // the place where they have gone an advance on
+        std::map<Step, int> next;  // places that tips have gone on to from here
+        std::optional<Equilibrium::Snapshot>
+            snapshot;                // to come back to; in a linear scene with a single tip of the last places only
+        std::map<int, Known> known;  // by number of the time
         std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, Slopes> slopes;                   // their derivatives
-        std::map<int, std::vector<Vec2>> probes;        // what they read, whatever the shift; in a linear scene of times 0 and last
-        std::vector<std::optional<TipBoxes>> boxes;     // [growing] about the tips' next advance; none: nothing is missed
-        std::set<int> guessed;                          // times at which the station's state is no more than roughly known
+        std::map<int, std::vector<Vec2>> probes;     // what they read, whatever the shift; in a linear scene of times 0 and last
+        std::vector<std::optional<TipBoxes>> boxes;  // [growing] about the tips' next advance; none: nothing is missed
+        std::set<int> guessed;                       // times at which the station's state is no more than roughly known
     };
 
     Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
@@ -156,8 +158,8 @@ class Quasistatic {
     bool know_slopes(std::size_t number, int time);
     bool goes_with_load(const std::vector<Vec2>& drivers) const;
     std::optional<Slopes> slopes_here(const Missed& missed);
-    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
-                    std::vector<LoadState>& slopes) const;
+    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
+                    bool as_end, std::vector<LoadState>& slopes) const;
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     std::vector<std::optional<TipBoxes>> boxes_ahead() const;
@@ -177,23 +179,23 @@ class Quasistatic {
     Equilibrium equilibrium_;
     std::vector<MaterialSlope> numbers_;
     FineTip fine_tip_;
-    std::vector<double> shift_;                   // [numbers]; empty: none
-    std::deque<Place> places_;                    // parents first
+    std::vector<double> shift_;  // [numbers]; empty: none
+    std::deque<Place> places_;   // parents first
     bool rough_ = false;
-    const Place* entered_ = nullptr;              // the one that the equilibrium stands at
+    const Place* entered_ = nullptr;  // the one that the equilibrium stands at
     std::vector<GrowingTip> growing_;
-    std::vector<int> way_;                        // [stations] places
-    std::deque<int> coming_;                      // that the way goes on through, as far as it is told
-    int closer_ = 1;                              // so much closer may stations stand: 1, 2 or 4
-    std::map<unsigned, double> tried_;            // by front: its critical time when it was tried last, times `drive` then
-    double time_step_ = 0;                        // between two times at which equilibria are known [s]
-    int last_time_ = 0;                           // number of the last of them
+    std::vector<int> way_;              // [stations] places
+    std::deque<int> coming_;            // that the way goes on through, as far as it is told
+    int closer_ = 1;                    // so much closer may stations stand: 1, 2 or 4
+    std::map<unsigned, double> tried_;  // by front: its critical time when it was tried last, times `drive` then
+    double time_step_ = 0;              // between two times at which equilibria are known [s]
+    int last_time_ = 0;                 // number of the last of them
     std::string failure_;
     int equilibria_ = 0;
     Equilibrium::Outcome outcome_ = Equilibrium::Outcome::solved;  // of the last one
 
-    struct Coarse;                                // the second grid
+    struct Coarse;  // the second grid
     std::unique_ptr<Coarse> coarse_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -5,8 +5,8 @@
 #include <bit>
 #include <cmath>
 
-// The way of the cracks: which tips move on from a place, where to, and when. Each tip, or front of tips that are alike, is tried:
-// it goes its own next advance while the others stand, and the one whose advance pays for itself at the least load moves.
+// The way of the cracks: which tips move on from a place, where to, and when. Each tip, or front of tips that are alike, is
+// tried: it goes its own next advance while the others stand, and the one whose advance pays for itself at the least load moves.
 
 namespace crampfit {
 
@@ -14,12 +14,12 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that between
-// the tips of a symmetric specimen, and no grid tells them apart.
+// Tips whose G agrees to this part, with wood as tough ahead, move together: rounding and Newton's method leave less than that
+// between the tips of a symmetric specimen, and no grid tells them apart.
 constexpr double alike = 1e-4;
 
-// A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has changed
-// since, is this many times that of another.
+// A front is not tried where the load at which it would move, as it was when it was tried last and by how G at its tip has
+// changed since, is this many times that of another.
 constexpr double far_above = 1.5;
 
 // G at the tip over toughness below which a crack is not about to move.
@@ -28,15 +28,15 @@ constexpr double far_below = 0.3;
 // Of a single tip in a linear scene so many of the last places can be come back to: more than closer stations ask for.
 constexpr std::size_t kept_places = 32;
 
-// Second difference of the energy released over the least of three, above which stations stand closer: at an eighth of it a parabola has
-// its least between them, and the load its peak half of that higher.
+// Second difference of the energy released over the least of three, above which stations stand closer: at an eighth of it a
+// parabola has its least between them, and the load its peak half of that higher.
 constexpr double narrow = 0.04;
 
 bool is_narrow(double before, double least, double after) {
     return least > 0.0 && before > least && after > least && before - 2.0 * least + after > narrow * least;
 }
 
-} // namespace
+}  // namespace
 
 // The equilibrium stands at a new place of the cracks.
 int Quasistatic::add_place(int parent, Step step) {
@@ -57,7 +57,8 @@ int Quasistatic::add_place(int parent, Step step) {
     station.left = place.inside == 0;
     place.boxes = boxes_ahead();
     if (!plan_.linear || growing_.size() > 1 || closer_ > 1) place.snapshot = equilibrium_.save();
-    if (plan_.linear && growing_.size() == 1 && places_.size() > kept_places) places_[places_.size() - 1 - kept_places].snapshot.reset();
+    if (plan_.linear && growing_.size() == 1 && places_.size() > kept_places)
+        places_[places_.size() - 1 - kept_places].snapshot.reset();
     entered_ = &place;
     return static_cast<int>(places_.size()) - 1;
 }
@@ -73,7 +74,8 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
     const CrackTip& tip = equilibrium_.cracks().lines[growing.crack].tip(growing.at_end);
     const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
-    return tip.position + 0.25 * quarters * growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
+    return tip.position +
+           0.25 * quarters * growing.increment * growth_direction(criterion, tip, load, materials_, growing.increment);
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
@@ -89,7 +91,8 @@ int Quasistatic::next(int number, Step step, double now) {
     const int time = time_until(now);
     if (!leader_ && !know_exactly(number, time)) return -1;
     enter(from);
-    if (!leader_ && !plan_.linear) equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
+    if (!leader_ && !plan_.linear)
+        equilibrium_.set_displacements(from.known.at(time).displacement, time_of(time), from.known.at(time).contacts);
     std::vector<CrackFields::NewField> fields;
     for (std::size_t t = 0; t < growing_.size(); ++t) {
         if (!(step.tips >> t & 1u) || !equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end).inside) continue;
@@ -114,7 +117,8 @@ bool Quasistatic::follow_leader(std::size_t place) {
     return true;
 }
 
-// Lets these tips be the ones that move on from a place, and finds their routes. False where an equilibrium on the way is missing.
+// Lets these tips be the ones that move on from a place, and finds their routes. False where an equilibrium on the way is
+// missing.
 bool Quasistatic::let_move(int number, unsigned tips, double now) {
     Place& place = places_[number];
     if (place.tips == tips) return true;
@@ -153,8 +157,8 @@ bool Quasistatic::reach(std::size_t station, double now) {
     return true;
 }
 
-// Tells where the way goes on from its last place: an increment, or two with closer places between them where the second place is one of
-// narrowly least energy released. At regular places only.
+// Tells where the way goes on from its last place: an increment, or two with closer places between them where the second place is
+// one of narrowly least energy released. At regular places only.
 bool Quasistatic::extend(double now) {
     const int last = way_.back();
     const unsigned tips = places_[last].tips;
@@ -163,7 +167,8 @@ bool Quasistatic::extend(double now) {
     coming_ = {on};
     if (closer_ == 1 || places_[on].station.left || !let_move(on, tips, now)) return true;
     const int after = next(on, {tips}, now);
-    if (after < 0 || places_[after].station.left || !let_move(after, tips, now) || places_[places_[after].further].station.left) return true;
+    if (after < 0 || places_[after].station.left || !let_move(after, tips, now) || places_[places_[after].further].station.left)
+        return true;
     const std::vector<int> closer = closer_places({last, on, after}, now);
     if (!closer.empty()) coming_.assign(closer.begin(), closer.end());
     return true;
@@ -176,14 +181,12 @@ double Quasistatic::released(int number, int time) {
     return places_[number].states.at(time).potential - places_[further].states.at(time).end_potential;
 }
 
-// Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of narrowly
-// least energy released; else none. First half way to either side, then about the least of these.
+// Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of
+// narrowly least energy released; else none. First half way to either side, then about the least of these.
 std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, double now) {
     const int time = time_until(now);
     std::map<int, std::pair<int, double>> found;  // by quarters of an increment from the first: place, and energy released
-    const auto add = [&](int quarters, int place) {
-        found[quarters] = {place, place < 0 ? -1.0 : released(place, time)};
-    };
+    const auto add = [&](int quarters, int place) { found[quarters] = {place, place < 0 ? -1.0 : released(place, time)}; };
     const auto narrow_at = [&](int middle, int apart) {
         return is_narrow(found[middle - apart].second, found[middle].second, found[middle + apart].second);
     };
@@ -205,7 +208,8 @@ std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, dou
     return places;
 }
 
-// A place some quarters of an increment beyond a regular one, with what lies an advance ahead of it; -1 where there is no equilibrium.
+// A place some quarters of an increment beyond a regular one, with what lies an advance ahead of it; -1 where there is no
+// equilibrium.
 int Quasistatic::place_between(int number, int quarters, double now) {
     const unsigned tips = places_[number].tips;
     const int between = next(number, {tips, quarters}, now);
@@ -255,7 +259,8 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
         const auto same = [&](std::size_t front) {
             const GrowingTip& other = growing_[std::countr_zero(found[front])];
             return other.ahead == tip.ahead && other.increment == tip.increment && load > 0.0 &&
-                   std::abs(first[front].first - load) <= 0.5 * alike * load && std::abs(first[front].second - toughness) <= alike * toughness;
+                   std::abs(first[front].first - load) <= 0.5 * alike * load &&
+                   std::abs(first[front].second - toughness) <= alike * toughness;
         };
         while (f < found.size() && !same(f)) ++f;
         if (f == found.size()) {
@@ -304,7 +309,8 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
 }
 
 // When the front that is set to move from a place does, if that is before `until`.
-Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until, bool closely) {
+Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialMap& materials, double now, double until,
+                                                     bool closely) {
     const Station& station = places_[number].station;
     const double toughness = mean_toughness(materials, station.moving);
     const auto judge = [&]() -> Critical { return {station.critical_time(toughness, rough_), toughness}; };
@@ -331,9 +337,12 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         const MovingTip& tip = station.moving.front();
         return station.states.at(time).tips[2 * tip.crack + tip.at_end].G < far_below * toughness;
     };
-    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new one.
+    // What a crack runs through without more load has been due before, and one state says so: the last that is known, else a new
+    // one.
     int known = low;
-    const auto both_known = [&](int time) { return places_[number].states.count(time) && places_[places_[number].further].states.count(time); };
+    const auto both_known = [&](int time) {
+        return places_[number].states.count(time) && places_[places_[number].further].states.count(time);
+    };
     while (known > 0 && !closely && growing_.size() == 1 && !both_known(known)) --known;
     for (const int time : {known, low}) {
         if (time == 0 || far_from_critical(time)) continue;
@@ -358,4 +367,4 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
     }
 }
 
-} // namespace crampfit
+}  // namespace crampfit

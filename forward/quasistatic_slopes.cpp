@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-// What is kept of each equilibrium beside its state: what the scene's probes read there, and the derivatives of both by numbers of the
-// materials, with which states are moved to first order.
+// What is kept of each equilibrium beside its state: what the scene's probes read there, and the derivatives of both by numbers
+// of the materials, with which states are moved to first order.
 
 namespace crampfit {
 
@@ -26,10 +26,10 @@ std::optional<double> multiple(const std::vector<Vec2>& wanted, const std::vecto
     return both / square;
 }
 
-} // namespace
+}  // namespace
 
-// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know next to
-// nothing.
+// Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know
+// next to nothing.
 void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const {
     constexpr double beside = 2.0;  // [wide cells]
     const double reach = beside * coarse()->body_.layout.cell.maxCoeff();
@@ -38,7 +38,8 @@ void Quasistatic::take_off_grid_error(std::vector<Vec2>& probes, const std::vect
     for (std::size_t i = 0; i < probes.size() && !wide.empty(); ++i) {
         bool far = wide[i].allFinite();
         for (std::size_t k = i * group; k < (i + 1) * group && far; ++k)
-            for (const CrackLine& line : equilibrium_.cracks().lines) far = far && distance_to(line.points, asked.places[k]) > reach;
+            for (const CrackLine& line : equilibrium_.cracks().lines)
+                far = far && distance_to(line.points, asked.places[k]) > reach;
         if (far) probes[i] += (probes[i] - wide[i]) / 3.0;
     }
 }
@@ -61,7 +62,8 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
     if (!shift_.empty()) show_shifted(number, time);
 }
 
-// Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear scene.
+// Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear
+// scene.
 bool Quasistatic::goes_with_load(const std::vector<Vec2>& drivers) const {
     const Boundary& boundary = equilibrium_.boundary();
     bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium_.time() > 0.0;
@@ -125,15 +127,16 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
         if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
         if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
         for (std::size_t n = 0; n < numbers_.size(); ++n)
-            found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
+            found[n].tips[2 * tip.crack + tip.at_end].G =
+                equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
     }
     all.states = std::move(found);
     return all;
 }
 
 // Adds the derivatives of what the grid misses to its own.
-void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid, bool as_end,
-                             std::vector<LoadState>& slopes) const {
+void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
+                             bool as_end, std::vector<LoadState>& slopes) const {
     const int gauge = Gauges(scene_).force;
     const Vec2 direction = Gauges(scene_).force_direction;
     std::vector<Vec2> load = missed.by_displacement;
@@ -147,7 +150,8 @@ void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slop
         const double ratio_slope = (more - missed.energy * of_grid[n].potential / potential) / potential;
         (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium_.power();
         if (!as_end)
-            slopes[n].reactions[gauge] = ratio * of_grid[n].reactions[gauge] + ratio_slope * equilibrium_.reactions()[gauge].dot(direction) * direction;
+            slopes[n].reactions[gauge] =
+                ratio * of_grid[n].reactions[gauge] + ratio_slope * equilibrium_.reactions()[gauge].dot(direction) * direction;
     }
 }
 
@@ -170,7 +174,8 @@ void Quasistatic::show_shifted(std::size_t number, int time) {
     move(state.end_power, [](const LoadState& s) { return s.end_power; });
     move(state.displacement, [](const LoadState& s) { return s.displacement; });
     for (std::size_t d = 0; d < state.reactions.size(); ++d)
-        for (int axis = 0; axis < 2; ++axis) move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
+        for (int axis = 0; axis < 2; ++axis)
+            move(state.reactions[d][axis], [&](const LoadState& s) { return s.reactions[d][axis]; });
     for (std::size_t k = 0; k < state.tips.size(); ++k) move(state.tips[k].G, [&](const LoadState& s) { return s.tips[k].G; });
     place.station.states[time] = std::move(state);
 }
@@ -231,4 +236,4 @@ std::vector<Vec2> Quasistatic::probes_at(std::size_t station_number, double time
     return found;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

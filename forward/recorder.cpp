@@ -15,7 +15,8 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
     const bool plane_strain = scene.model.plane == PlaneCondition::strain;
     const auto add = [&](int p, const Mat2& stress, double zz) {
         frame.moved.push_back(value_at(body, p, displacement).cast<float>());
-        frame.stress.push_back(Eigen::Vector4d(stress(0, 0), stress(1, 1), 0.5 * (stress(0, 1) + stress(1, 0)), zz).cast<float>());
+        frame.stress.push_back(
+            Eigen::Vector4d(stress(0, 0), stress(1, 1), 0.5 * (stress(0, 1) + stress(1, 0)), zz).cast<float>());
     };
     for (int c = 0; c < body.layout.cells(); ++c) {
         for_groups(points, c, [&](const PointGroup& group) {
@@ -29,11 +30,13 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
                 return;
             }
             for (int p = group.first; p < group.first + group.count; ++p) {
-                const Mat2 stress = elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates).stress;
+                const Mat2 stress =
+                    elastic_state(gradient_at(body, p, displacement), points.stiffness_of(p), plan.rotates).stress;
                 const double xx = stress(0, 0), yy = stress(1, 1), xy = 0.5 * (stress(0, 1) + stress(1, 0));
                 double zz = 0.0;
                 if (plane_strain)
-                    zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy) : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
+                    zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy)
+                                                     : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
                 add(p, stress, zz);
             }
         });
@@ -206,4 +209,4 @@ void Recorder::finish(RunStatus status, std::string message) {
     if (crack_ >= 0) record_.cracks.erase(record_.cracks.begin() + crack_);  // the series holds it
 }
 
-} // namespace crampfit
+}  // namespace crampfit

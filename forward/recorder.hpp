@@ -12,7 +12,7 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
 
 /// The tip whose length, place, G and K the series holds: of the first crack that grows, or of the first.
 struct TrackedTip {
-    int crack = -1;      // -1: no crack
+    int crack = -1;  // -1: no crack
     bool at_end = true;
 };
 TrackedTip tracked_tip(const Scene& scene);
@@ -52,12 +52,12 @@ class Recorder {
     const Discretisation& body_;
     const ExplicitSolver& solver_;
     Gauges gauges_;
-    int crack_ = -1;        // the one in the series; -1: none
+    int crack_ = -1;  // the one in the series; -1: none
     bool at_end_ = true;
 
     Record record_;
-    long interval_ = 1;     // steps between rows
-    bool evenly_ = true;    // the interval is known from the end time
+    long interval_ = 1;   // steps between rows
+    bool evenly_ = true;  // the interval is known from the end time
     long steps_ = 0;
     long next_row_ = 0;
     int frames_saved_ = 0;
@@ -68,4 +68,4 @@ class Recorder {
     bool finite_ = true;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -26,17 +26,20 @@ void for_groups(const Points& points, int cell, const Visit& visit) {
 
 /// Strain xx, yy, 2 xy.
 inline Eigen::Vector3d strain_of(const Mat2& gradient, bool rotates) {
-    const Mat2 strain = rotates ? Mat2(Polar(gradient).stretch - Mat2::Identity()) : Mat2(0.5 * (gradient + gradient.transpose()));
+    const Mat2 strain =
+        rotates ? Mat2(Polar(gradient).stretch - Mat2::Identity()) : Mat2(0.5 * (gradient + gradient.transpose()));
     return {strain(0, 0), strain(1, 1), 2.0 * strain(0, 1)};
 }
 
-/// What the law of points that remember is told of their strain. Plastic wood flows without a change of volume, which in plane strain
-/// four points a cell cannot all do at once: there they share the mean of their dilatation (Nagtegaal, Parks and Rice 1974; Hughes
-/// 1980). The work of stresses s then is that of `shared(s)` with the strains themselves.
+/// What the law of points that remember is told of their strain. Plastic wood flows without a change of volume, which in plane
+/// strain four points a cell cannot all do at once: there they share the mean of their dilatation (Nagtegaal, Parks and Rice
+/// 1974; Hughes 1980). The work of stresses s then is that of `shared(s)` with the strains themselves.
 class SeenStrains {
   public:
-    SeenStrains(const Discretisation& body, const History& history, const PointGroup& group, const std::vector<Vec2>& displacement, bool rotates)
-        : volume_(&body.points.volume[group.first]), count_(group.count), shares_(group.count > 1 && history.flows_in_plane(body.points.cell[group.first])) {
+    SeenStrains(const Discretisation& body, const History& history, const PointGroup& group,
+                const std::vector<Vec2>& displacement, bool rotates)
+        : volume_(&body.points.volume[group.first]), count_(group.count),
+          shares_(group.count > 1 && history.flows_in_plane(body.points.cell[group.first])) {
         for (int i = 0; i < count_; ++i) {
             gradient[i] = gradient_at(body, group.first + i, displacement);
             strain[i] = strain_of(gradient[i], rotates);
@@ -72,4 +75,4 @@ class SeenStrains {
     bool shares_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -51,7 +51,8 @@ CellWeights cpdi_weights(const Vec2& place, const Vec2& cell, const Vec2& half) 
     CellWeights weights;
     for (const double right : {-1.0, 1.0}) {
         for (const double up : {-1.0, 1.0}) {
-            const CellWeights corner = cell_weights(ShapeFunction::linear, place + half.cwiseProduct(Vec2(right, up)), cell, half);
+            const CellWeights corner =
+                cell_weights(ShapeFunction::linear, place + half.cwiseProduct(Vec2(right, up)), cell, half);
             for (std::size_t k = 0; k < 4; ++k) {
                 weights.value[k] += 0.25 * corner.value[k];
                 weights.slope_x[k] += 0.25 * right / half.x() * corner.value[k];
@@ -62,19 +63,21 @@ CellWeights cpdi_weights(const Vec2& place, const Vec2& cell, const Vec2& half) 
     return weights;
 }
 
-} // namespace
+}  // namespace
 
-CellWeights cell_weights(ShapeFunction kind, const Vec2& place, const Vec2& cell, const Vec2& half, const std::array<CellEnds, 2>& ends) {
+CellWeights cell_weights(ShapeFunction kind, const Vec2& place, const Vec2& cell, const Vec2& half,
+                         const std::array<CellEnds, 2>& ends) {
     if (kind == ShapeFunction::cpdi) return cpdi_weights(place, cell, half);
     if (kind == ShapeFunction::bspline2)
         return product(spline_weights(place.x(), cell.x(), ends[0]), spline_weights(place.y(), cell.y(), ends[1]));
     const auto along = [&](int axis) {
         const auto at = [&](double offset) {
-            return kind == ShapeFunction::linear ? linear_weight(offset, cell[axis]) : gimp_weight(offset, cell[axis], half[axis]);
+            return kind == ShapeFunction::linear ? linear_weight(offset, cell[axis])
+                                                 : gimp_weight(offset, cell[axis], half[axis]);
         };
         return std::array{at(place[axis]), at(place[axis] - cell[axis])};
     };
     return product(along(0), along(1));
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -25,8 +25,9 @@ struct CellEnds {
     bool last;   // none after it
 };
 
-/// The three quadratic B-splines that a cell sees, at `place` from its lower end [m]. The knots at the grid's ends are threefold (de
-/// Boor 1978, ch. IX), so that the splines add up to one there as well and the outermost one alone has a value on the boundary.
+/// The three quadratic B-splines that a cell sees, at `place` from its lower end [m]. The knots at the grid's ends are threefold
+/// (de Boor 1978, ch. IX), so that the splines add up to one there as well and the outermost one alone has a value on the
+/// boundary.
 std::array<Weight, 3> spline_weights(double place, double h, CellEnds ends);
 
 /// Most nodes that a cell sees: 3 x 3 with quadratic B-splines; 2 x 2 with all others.
@@ -42,9 +43,9 @@ struct CellWeights {
     std::array<double, most_nodes> slope_y{};  // [1/m]
 };
 
-/// At `place` in the cell (from its lower left corner, [m]) for a point whose domain has half widths `half`. CPDI: the hats averaged
-/// over the corners of the domain, as a parallelogram (Sadeghirad, Brannon and Burghardt 2011).
+/// At `place` in the cell (from its lower left corner, [m]) for a point whose domain has half widths `half`. CPDI: the hats
+/// averaged over the corners of the domain, as a parallelogram (Sadeghirad, Brannon and Burghardt 2011).
 CellWeights cell_weights(ShapeFunction kind, const Vec2& place, const Vec2& cell, const Vec2& half,
                          const std::array<CellEnds, 2>& ends = {});
 
-} // namespace crampfit
+}  // namespace crampfit

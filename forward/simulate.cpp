@@ -51,7 +51,8 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
 }
 
 // Frames at even times.
-void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk, Record& record) {
+void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                 Quasistatic& walk, Record& record) {
     Revisit revisit(scene, plan, materials, body, walk);
     record.point_position = revisit.body().points.position;
     record.point_size = revisit.body().layout.point_size();
@@ -68,17 +69,17 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
-// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction hangs on
-// the way to a state, which is not gone again here.
+// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction
+// hangs on the way to a state, which is not gone again here.
 bool small_strain_is_a_guess(const Scene& scene, const Plan& plan, const Record& record) {
     const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
     return ended && plan.grows && !plan.rotates && !plan.friction && scene.solver.strain == StrainMeasure::automatic;
 }
 
-// Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest that the
-// edges go while the specimen carries a load.
-void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body, Quasistatic& walk,
-                        Record& record) {
+// Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest
+// that the edges go while the specimen carries a load.
+void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                        Quasistatic& walk, Record& record) {
     constexpr double carries = 0.1;  // of the largest strain energy
     constexpr double counts = 0.02;
     const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
@@ -95,11 +96,14 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
     };
     const double without = power(false), with = without != 0.0 ? power(true) : 0.0;
     if (with == 0.0 || std::abs(with / without - 1.0) <= counts) return;
-    record.message += fmt::format("; small strain: turns of the wood would change the force by {:+.1f} % at {:.3g} mm, see solver.strain = "
-                                  "\"finite rotation\"", 100.0 * (with / without - 1.0), 1e3 * last->displacement);
+    record.message +=
+        fmt::format("; small strain: turns of the wood would change the force by {:+.1f} % at {:.3g} mm, see solver.strain = "
+                    "\"finite rotation\"",
+                    100.0 * (with / without - 1.0), 1e3 * last->displacement);
 }
 
-Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, const SimulateOptions& options) {
+Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
+                   const SimulateOptions& options) {
     long step = 0;
     double crack_length = 0.0;  // it stands
     if (const int crack = tracked_tip(scene).crack; crack >= 0)
@@ -169,7 +173,7 @@ Scene with_cell(Scene scene, double cell) {
     return scene;
 }
 
-} // namespace
+}  // namespace
 
 Record simulate(const Scene& scene, const SimulateOptions& options) {
     if (scene.model.cell == 0.0) {
@@ -188,7 +192,9 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
                                       : run_quasistatic(scene, plan, materials, body, options);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);
-    if (!plan.quasistatic) record.explanation += fmt::format("{:<15} kinetic energy up to {:.2g} times the strain energy\n", "motion", kinetic_share(record));
+    if (!plan.quasistatic)
+        record.explanation +=
+            fmt::format("{:<15} kinetic energy up to {:.2g} times the strain energy\n", "motion", kinetic_share(record));
     record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return record;
 }
@@ -198,7 +204,8 @@ double kinetic_share(const Record& record) {
     double most_strain = 0.0, share = 0.0;
     for (const Instant& row : record.series) most_strain = std::max(most_strain, row.strain_energy);
     for (const Instant& row : record.series)
-        if (row.strain_energy > 0.0 && row.strain_energy >= counts * most_strain) share = std::max(share, row.kinetic_energy / row.strain_energy);
+        if (row.strain_energy > 0.0 && row.strain_energy >= counts * most_strain)
+            share = std::max(share, row.kinetic_energy / row.strain_energy);
     return share;
 }
 
@@ -212,4 +219,4 @@ std::string explain(const Scene& scene) {
     return describe(scene, make_plan(scene, materials, body), body);
 }
 
-} // namespace crampfit
+}  // namespace crampfit

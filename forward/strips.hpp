@@ -5,8 +5,8 @@
 
 namespace crampfit {
 
-/// Rows of cells in strips. Every second strip is taken first, then the others: strips of one turn share no node, so that any number
-/// of threads adds to the nodes in the same order and comes to the same bits.
+/// Rows of cells in strips. Every second strip is taken first, then the others: strips of one turn share no node, so that any
+/// number of threads adds to the nodes in the same order and comes to the same bits.
 class Strips {
   public:
     explicit Strips(const Layout& layout)
@@ -27,4 +27,4 @@ class Strips {
     int cells_, cells_a_strip_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

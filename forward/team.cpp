@@ -14,7 +14,7 @@ void wait_while(const std::atomic<Value>& value, Value old) {
     value.wait(old, std::memory_order_acquire);
 }
 
-} // namespace
+}  // namespace
 
 Team::Team(int threads) {
     for (int i = 1; i < threads; ++i) others_.emplace_back([this] { follow(); });
@@ -52,4 +52,4 @@ void Team::follow() {
     }
 }
 
-} // namespace crampfit
+}  // namespace crampfit

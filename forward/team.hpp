@@ -41,11 +41,11 @@ class Team {
     Call call_ = nullptr;
     const void* job_ = nullptr;
     int count_ = 0;
-    std::atomic<int> next_{0};      // job to be taken
-    std::atomic<int> busy_{0};      // of the others
+    std::atomic<int> next_{0};  // job to be taken
+    std::atomic<int> busy_{0};  // of the others
     std::atomic<unsigned> round_{0};
     std::atomic<bool> over_{false};
     std::vector<std::jthread> others_;
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -36,7 +36,7 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> strains(const CellWeights& w, int nodes
     return B;
 }
 
-} // namespace
+}  // namespace
 
 TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end,
                    double advance, double slack) {
@@ -210,4 +210,4 @@ double TipPatch::local_share(double gone, const std::vector<Vec2>& displacement)
     return mean > 0.0 ? rate_over(cell_) / mean : 1.0;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -38,15 +38,15 @@ class TipPatch {
     double softness_for(double gone, const Eigen::VectorXd& jumps) const;
     Eigen::VectorXd free_jumps(const std::vector<Vec2>& displacement) const;
 
-    double reach_ = 0;        // half width [m]
-    double cell_ = 0;         // way of the tip that frees a pair [m]
-    double advance_ = 0;      // what was asked for, or as far as the tip stays in the wood [m]
-    std::vector<int> held_;   // fields
-    std::vector<Vec2> place_; // [held] [m]
-    Eigen::MatrixXd by_held_; // [jumps x 2 held] of the free pairs per displacement of the held fields
-    Eigen::MatrixXd flexibility_;    // C [jumps x jumps] [m/N]
-    std::vector<double> freed_;      // [pairs] share when the patch was made, below 0 ahead
-    std::vector<double> compliance_; // [pairs] c [m/N]
+    double reach_ = 0;                // half width [m]
+    double cell_ = 0;                 // way of the tip that frees a pair [m]
+    double advance_ = 0;              // what was asked for, or as far as the tip stays in the wood [m]
+    std::vector<int> held_;           // fields
+    std::vector<Vec2> place_;         // [held] [m]
+    Eigen::MatrixXd by_held_;         // [jumps x 2 held] of the free pairs per displacement of the held fields
+    Eigen::MatrixXd flexibility_;     // C [jumps x jumps] [m/N]
+    std::vector<double> freed_;       // [pairs] share when the patch was made, below 0 ahead
+    std::vector<double> compliance_;  // [pairs] c [m/N]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

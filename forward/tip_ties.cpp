@@ -11,7 +11,7 @@ Vec2 jump_of(const FieldPair& pair, const std::vector<Vec2>& displacement) {
     return displacement[pair.left] - displacement[pair.right];
 }
 
-} // namespace
+}  // namespace
 
 double TipTies::share(const Tie& tie, double freed) const {
     if (freed >= 1.0) return 1.0;
@@ -63,7 +63,7 @@ void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass,
         const double left = mass[pair.left];
         const double right = mass[pair.right];
         Vec2 held = (right * force[pair.left] - left * force[pair.right]) / (left + right);  // both sides go on alike
-        held -= std::min(0.0, held.dot(pair.normal)) * pair.normal;  // pressure is left to the faces
+        held -= std::min(0.0, held.dot(pair.normal)) * pair.normal;                          // pressure is left to the faces
         tie.stretch = tie.slack * tie.compliance * held;
         tie.waits = false;
     }
@@ -103,7 +103,8 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
 }
 
 TipTies::Advance TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                                       const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const {
+                                       const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
+                                       double dt) const {
     const double width_here = width(cracks.lines[crack].tip(at_end));
     const auto taken_on = [&](double way) {  // [J]
         double sum = 0.0;
@@ -130,4 +131,4 @@ TipTies::Advance TipTies::balanced_way(const CrackFields& cracks, int crack, boo
     return {low, asked_on(low)};
 }
 
-} // namespace crampfit
+}  // namespace crampfit

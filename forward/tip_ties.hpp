@@ -26,8 +26,8 @@ class TipTies {
 
     /// After a tip has moved or masses have changed. Pairs that are new are held by what holds them now, from the next `pull` on;
     /// those of the start of a run (`at_rest`) by nothing yet. `softness` is that of TipPatch, for new pairs.
-    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement,
-                 bool at_rest, double softness = 1.0);
+    void take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement, bool at_rest,
+                 double softness = 1.0);
 
     /// Lets the ties that are new hold their pairs together under these forces of the fields [N].
     void settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force);
@@ -63,11 +63,11 @@ class TipTies {
     double share(const Tie& tie, double freed) const;
     double stiffness(const Tie& tie, double f) const;
     double width(const CrackTip& tip) const;
-    Vec2 cell_;                       // [m]
-    double thickness_;                // [m]
-    double most_frequency_squared_;   // [1/s^2]
-    std::vector<Tie> ties_;           // [pairs]
-    std::vector<std::size_t> live_;   // of them those that hold
+    Vec2 cell_;                      // [m]
+    double thickness_;               // [m]
+    double most_frequency_squared_;  // [1/s^2]
+    std::vector<Tie> ties_;          // [pairs]
+    std::vector<std::size_t> live_;  // of them those that hold
 };
 
-} // namespace crampfit
+}  // namespace crampfit

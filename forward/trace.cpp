@@ -58,7 +58,8 @@ class Tracer {
   public:
     Tracer(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk,
            const std::function<bool(double, double)>& go_on)
-        : scene_(scene), plan_(plan), materials_(materials), walk_(walk), go_on_(go_on), gauges_(scene), tracked_(tracked_tip(scene)) {
+        : scene_(scene), plan_(plan), materials_(materials), walk_(walk), go_on_(go_on), gauges_(scene),
+          tracked_(tracked_tip(scene)) {
         sample_ = (std::isfinite(plan.end_time) ? plan.end_time : 1.0) / scene.output.samples;
         for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
         for (const Body& body : scene.bodies) record_.reactions.push_back({body.name, {}});
@@ -94,7 +95,8 @@ class Tracer {
                 // Both ends of a crack share what it has grown.
                 const auto ends = std::count_if(before.moving.begin(), before.moving.end(), same);
                 const double grown = (here.lengths[crack] - before.lengths[crack]) / static_cast<double>(ends);
-                spent += grown * here.thickness * mean_toughness(materials_, {before.tips[crack][at_end], here.tips[crack][at_end]});
+                spent +=
+                    grown * here.thickness * mean_toughness(materials_, {before.tips[crack][at_end], here.tips[crack][at_end]});
             }
         }
         fracture_energy_.push_back(spent);
@@ -178,7 +180,8 @@ class Tracer {
         const double from = walk_.station(i).lengths[tracked_.crack], to = walk_.station(i + 1).lengths[tracked_.crack];
         const Moment top = mixed(moment(i, peak->time), moment(i + 1, peak->time), (peak->length - from) / (to - from));
         const auto beyond = std::ranges::upper_bound(record_.driving, peak->length, {}, &CriticalLoad::crack_length);
-        record_.driving.insert(beyond, driving_row(top.load, tracked_, peak->length, top.tips[tracked_.crack][tracked_.at_end], peak->toughness));
+        record_.driving.insert(
+            beyond, driving_row(top.load, tracked_, peak->length, top.tips[tracked_.crack][tracked_.at_end], peak->toughness));
         return top;
     }
 
@@ -204,7 +207,8 @@ class Tracer {
         Moment after = moment(next, now);
         const bool arrests = !walk_.station(next).left && critical_[next] > now;
         if (arrests && std::isfinite(critical_[next])) {
-            if (!plan_.linear && growing_tips(scene_) == 1) critical_[next - 1] = walk_.critical(next - 1, materials_, now, true).time;
+            if (!plan_.linear && growing_tips(scene_) == 1)
+                critical_[next - 1] = walk_.critical(next - 1, materials_, now, true).time;
             const double s = (now - critical_[next - 1]) / (critical_[next] - critical_[next - 1]);
             after = mixed(moment(next - 1, now), after, std::clamp(s, 0.0, 1.0));
         } else if (beyond_length(after) && length_of(after) > *scene_.stop.crack_length) {
@@ -237,12 +241,14 @@ class Tracer {
             if (span > 0.0) stop = std::min(stop, (*scene_.stop.crack_length - length_of(from)) / span);
         }
         if (beyond_displacement(to) && to.load.displacement > from.load.displacement)
-            stop = std::min(stop, (*scene_.stop.displacement - from.load.displacement) / (to.load.displacement - from.load.displacement));
+            stop = std::min(stop, (*scene_.stop.displacement - from.load.displacement) /
+                                      (to.load.displacement - from.load.displacement));
         if (beyond_time(to) && to.load.time > from.load.time)
             stop = std::min(stop, (end_time() - from.load.time) / (to.load.time - from.load.time));
         stop = std::max(stop, 0.0);
         const double span = to.load.time - from.load.time;
-        for (double time = next_sample(from.load.time); time < from.load.time + stop * span - rounding * sample_; time = next_sample(time))
+        for (double time = next_sample(from.load.time); time < from.load.time + stop * span - rounding * sample_;
+             time = next_sample(time))
             add(mixed(from, to, (time - from.load.time) / span), false);
         add(mixed(from, to, stop), false);
         if (stop < 1.0 || beyond_length(to) || beyond_displacement(to) || beyond_time(to))
@@ -335,10 +341,12 @@ class Tracer {
         if (!station.linear && found.time < now && found.time < station.states.begin()->second.time) return;
         const auto& [crack, at_end, route] = station.moving.front();
         const LoadState load = station.at(found.time);
-        record_.driving.push_back(driving_row(load, {crack, at_end}, station.lengths[crack], station.tips[crack][at_end], found.toughness));
+        record_.driving.push_back(
+            driving_row(load, {crack, at_end}, station.lengths[crack], station.tips[crack][at_end], found.toughness));
     }
 
-    CriticalLoad driving_row(const LoadState& load, const TrackedTip& at, double length, const Vec2& tip, double toughness) const {
+    CriticalLoad driving_row(const LoadState& load, const TrackedTip& at, double length, const Vec2& tip,
+                             double toughness) const {
         CriticalLoad row;
         row.crack_length = length;
         row.tip = tip;
@@ -366,14 +374,14 @@ class Tracer {
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;
-    double most_power_ = 0;                // [W]
+    double most_power_ = 0;  // [W]
 };
 
-} // namespace
+}  // namespace
 
 Record trace(const Scene& scene, const Plan& plan, const MaterialMap& materials, Quasistatic& walk,
              const std::function<bool(double, double)>& go_on) {
     return Tracer(scene, plan, materials, walk, go_on).run();
 }
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -18,7 +18,8 @@ class DensityLaw {
     DensityLaw(double first, double second, double grade)
         : span_(std::log(second / first)), here_(std::log((first + grade * (second - first)) / first)), grade_(grade) {}
 
-    // Linear in density^exponent; without one the power of density through both ends. Ends of equal density leave the grade itself.
+    // Linear in density^exponent; without one the power of density through both ends. Ends of equal density leave the grade
+    // itself.
     double between(double first, double second, const std::optional<double>& exponent) const {
         const bool level = std::abs(span_) < 1e-12;
         if (!exponent) return first * std::pow(second / first, level ? grade_ : here_ / span_);
@@ -33,7 +34,7 @@ class DensityLaw {
     double grade_;
 };
 
-} // namespace
+}  // namespace
 
 Material transition_wood(const Material& first, const Material& second, const DensityExponents& exponents, double grade) {
     const DensityLaw law(first.density, second.density, grade);
@@ -46,11 +47,14 @@ Material transition_wood(const Material& first, const Material& second, const De
         return wood;
     }
     const OrthotropicElasticity a = orthotropic(first), b = orthotropic(second);
-    wood.orthotropic = {law.between(a.E_R, b.E_R, exponents.E_R),    law.between(a.E_T, b.E_T, exponents.E_T),
-                        law.between(a.G_RT, b.G_RT, exponents.G_RT), law.ratio(a.nu_RT, b.nu_RT),
-                        law.between(a.E_L, b.E_L, exponents.E_L),    law.ratio(a.nu_LR, b.nu_LR),
+    wood.orthotropic = {law.between(a.E_R, b.E_R, exponents.E_R),
+                        law.between(a.E_T, b.E_T, exponents.E_T),
+                        law.between(a.G_RT, b.G_RT, exponents.G_RT),
+                        law.ratio(a.nu_RT, b.nu_RT),
+                        law.between(a.E_L, b.E_L, exponents.E_L),
+                        law.ratio(a.nu_LR, b.nu_LR),
                         law.ratio(a.nu_LT, b.nu_LT)};
     return wood;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

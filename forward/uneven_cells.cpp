@@ -61,22 +61,24 @@ struct UnevenCells::Local {
     Mat2 H;
     Eigen::Vector3d strain = Eigen::Vector3d::Zero();
     Vec2 d;
-    double u = 0, v = 0, w = 0, trace = 1;                       // U_xx, U_yy, U_xy per trace, and the trace, of the stretch
-    Eigen::Matrix<double, 3, 4> B;                               // of strain
-    Eigen::RowVector4d spin = Eigen::RowVector4d::Zero();        // of the turn
-    Eigen::Vector3d s;                                           // slope of the energy by strain
-    Vec2 t;                                                      // by d
-    double moment = 0;                                           // by the turn, which takes left_of(d) from d
-    Eigen::Vector4d p;                                           // by R^T dF
+    double u = 0, v = 0, w = 0, trace = 1;                 // U_xx, U_yy, U_xy per trace, and the trace, of the stretch
+    Eigen::Matrix<double, 3, 4> B;                         // of strain
+    Eigen::RowVector4d spin = Eigen::RowVector4d::Zero();  // of the turn
+    Eigen::Vector3d s;                                     // slope of the energy by strain
+    Vec2 t;                                                // by d
+    double moment = 0;                                     // by the turn, which takes left_of(d) from d
+    Eigen::Vector4d p;                                     // by R^T dF
     Mat2 turn = Mat2::Identity();
-    std::array<Vec2, 4> slope;                                   // of the nodes' shape functions [1/m]
+    std::array<Vec2, 4> slope;  // of the nodes' shape functions [1/m]
 };
 
 UnevenCells::Local UnevenCells::local(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_.layout;
     const Vec2 cell = layout.cell;
-    const double share = static_cast<double>((piece.box.to_x - piece.box.from_x) * (piece.box.to_y - piece.box.from_y)) / layout.points_per_cell();
-    const double x = 0.5 * (piece.box.from_x + piece.box.to_x) / layout.per_side, y = 0.5 * (piece.box.from_y + piece.box.to_y) / layout.per_side;
+    const double share =
+        static_cast<double>((piece.box.to_x - piece.box.from_x) * (piece.box.to_y - piece.box.from_y)) / layout.points_per_cell();
+    const double x = 0.5 * (piece.box.from_x + piece.box.to_x) / layout.per_side,
+                 y = 0.5 * (piece.box.from_y + piece.box.to_y) / layout.per_side;
     Local at;
     at.slope = {Vec2((y - 1.0) / cell.x(), (x - 1.0) / cell.y()), Vec2((1.0 - y) / cell.x(), -x / cell.y()),
                 Vec2(-y / cell.x(), (1.0 - x) / cell.y()), Vec2(y / cell.x(), x / cell.y())};
@@ -121,7 +123,8 @@ UnevenCells::State UnevenCells::state(const Piece& piece, const Unevenness& wood
     return state;
 }
 
-Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::vector<Vec2>& displacement, bool geometric) const {
+Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::vector<Vec2>& displacement,
+                                                 bool geometric) const {
     const Local at = local(piece, *piece.wood, displacement);
     Eigen::Matrix<double, 3, 6> strain_slope;
     strain_slope << at.B, Eigen::Matrix<double, 3, 2>::Zero();
@@ -133,7 +136,8 @@ Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::
     if (rotates_ && geometric) {
         // As in `elastic_tangent`: B and the spin change with the stretch, d turns, and so does all of the force.
         const double difference = (at.s[1] - at.s[0]) / at.trace, twice = 2.0 * at.s[2] / at.trace;
-        const Eigen::RowVector4d d_u(1.0 - at.u, -at.w, at.w, -at.u), d_v(-at.v, at.w, -at.w, 1.0 - at.v), d_w(-at.w, at.u, at.v, -at.w);
+        const Eigen::RowVector4d d_u(1.0 - at.u, -at.w, at.w, -at.u), d_v(-at.v, at.w, -at.w, 1.0 - at.v),
+            d_w(-at.w, at.u, at.v, -at.w);
         const Vec2 t_turned = left_of(at.t);
         const Eigen::Vector4d p_turned(-at.p[2], -at.p[3], at.p[0], at.p[1]);
         second.row(1).head<4>() += difference * d_w + twice * d_u;
@@ -152,4 +156,4 @@ Eigen::Matrix<double, 8, 8> UnevenCells::tangent(const Piece& piece, const std::
     return rates.transpose() * second * rates;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

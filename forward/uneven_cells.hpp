@@ -9,11 +9,11 @@
 
 namespace crampfit {
 
-/// What the wood of a cell with more than one adds to the energy of its points, which all have the cell's average stiffness, for where
-/// in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields. Most cells are one piece; a
-/// crack cuts them in several, each with its own wood. With F the gradient in a piece's middle, R its turn, c = u_0 - u_1 - u_2 + u_3 of
-/// the cell's nodes, d = R^T c and e Biot's strain (without `rotates` the small strain and R = 1) its energy is
-/// e . S e / 2 + e . G d + d . H d / 2.
+/// What the wood of a cell with more than one adds to the energy of its points, which all have the cell's average stiffness, for
+/// where in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields. Most cells are
+/// one piece; a crack cuts them in several, each with its own wood. With F the gradient in a piece's middle, R its turn, c = u_0
+/// - u_1 - u_2 + u_3 of the cell's nodes, d = R^T c and e Biot's strain (without `rotates` the small strain and R = 1) its energy
+/// is e . S e / 2 + e . G d + d . H d / 2.
 class UnevenCells {
   public:
     /// All must outlive this. Cells with a `history` have laws of their own; null: none has.
@@ -24,7 +24,7 @@ class UnevenCells {
 
     struct Piece {
         int cell;
-        int point;              // its first, which knows the fields
+        int point;  // its first, which knows the fields
         PointBox box;
         const Unevenness* wood;
     };
@@ -33,8 +33,8 @@ class UnevenCells {
     std::span<const Piece> pieces() const { return pieces_; }
 
     struct State {
-        double energy;                        // [J]
-        Eigen::Matrix<double, 8, 1> force;    // slope of the energy by the displacements of the piece's fields [N]
+        double energy;                      // [J]
+        Eigen::Matrix<double, 8, 1> force;  // slope of the energy by the displacements of the piece's fields [N]
     };
     State state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
 
@@ -54,4 +54,4 @@ class UnevenCells {
     std::map<std::pair<int, PointBox>, Unevenness> cut_;  // of pieces of cells, as they were met
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -9,7 +9,8 @@ double VelocityMapping::kinetic_energy(const std::vector<Vec2>& w, Team& team) {
     energy_.resize(strips_.count());
     strips_.each(team, [&](int strip) {
         double sum = 0.0;
-        for (int p = points.first_of_cell[strips_.first_cell(strip)]; p < points.first_of_cell[strips_.first_cell(strip + 1)]; ++p)
+        for (int p = points.first_of_cell[strips_.first_cell(strip)]; p < points.first_of_cell[strips_.first_cell(strip + 1)];
+             ++p)
             sum += 0.5 * points.mass[p] * value_at(body_, p, w).squaredNorm();
         energy_[strip] = sum;
     });
@@ -22,7 +23,8 @@ void VelocityMapping::hand_back(std::vector<Vec2>& v, const Nodes& nodes) {
     const Points& points = body_.points;
     from_points_.assign(v.size(), Vec2::Zero());
     strips_.each(nodes.team, [&](int strip) {
-        for (int p = points.first_of_cell[strips_.first_cell(strip)]; p < points.first_of_cell[strips_.first_cell(strip + 1)]; ++p) {
+        for (int p = points.first_of_cell[strips_.first_cell(strip)]; p < points.first_of_cell[strips_.first_cell(strip + 1)];
+             ++p) {
             const Vec2 momentum = points.mass[p] * value_at(body_, p, v);
             const CellWeights& weights = body_.weights[points.slot[p]];
             const auto node = points.node[p];
@@ -42,7 +44,8 @@ void VelocityMapping::take_out(std::vector<Vec2>& v, const Nodes& nodes) {
     for (std::size_t n = 0; n < v.size(); ++n) v[n] = term_[n] - v[n];
 }
 
-double VelocityMapping::extrapolate(std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt, const Nodes& nodes) {
+double VelocityMapping::extrapolate(std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt,
+                                    const Nodes& nodes) {
     const int order = choice_.velocity_update == VelocityUpdate::pic ? 1 : choice_.order;
     const std::size_t fields = velocity.size();
     const auto for_free = [&](const auto& visit) {  // what is prescribed has no acceleration yet
@@ -96,4 +99,4 @@ double VelocityMapping::carry(std::vector<Vec2>& w, std::vector<Vec2>& velocity,
     return lost;
 }
 
-} // namespace crampfit
+}  // namespace crampfit

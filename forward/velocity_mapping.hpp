@@ -6,9 +6,9 @@
 
 namespace crampfit {
 
-/// Velocities that the points carry from step to step, as in the material point method at large. Points of the undeformed specimen
-/// carry what some velocities w of the nodes give there, S w, and hand back A w, A = M^-1 S^T m S with the lumped masses M: A w is
-/// smoother than w. With accelerations a over a step dt, w goes to
+/// Velocities that the points carry from step to step, as in the material point method at large. Points of the undeformed
+/// specimen carry what some velocities w of the nodes give there, S w, and hand back A w, A = M^-1 S^T m S with the lumped masses
+/// M: A w is smoother than w. With accelerations a over a step dt, w goes to
 ///     FLIP     w + a dt, or with a share s of PIC  (1 - s) (w + a dt) + s (A w + a dt);  nodes move with A w
 ///     XPIC(m)  w - (1 - A)^m w + a dt;                                                   nodes move with A w
 ///     FMPM(m)  (1 + (1 - A) + ... + (1 - A)^(m-1)) (A w + a dt);                         nodes move with w
@@ -17,12 +17,15 @@ namespace crampfit {
 /// is prescribed keep it in the sums. On an undeformed grid none of this is needed: see ExplicitSolver.
 class VelocityMapping {
   public:
-    VelocityMapping(const SolverChoice& choice, const Discretisation& body) : choice_(choice), body_(body), strips_(body.layout) {}
+    VelocityMapping(const SolverChoice& choice, const Discretisation& body)
+        : choice_(choice), body_(body), strips_(body.layout) {}
 
     /// False: the nodes keep their velocities, and nothing here is called.
     bool is_used() const { return choice_.velocity_update != VelocityUpdate::automatic; }
     /// Whether nodes move with what the points carry (FMPM, PIC), or with what they hand back.
-    bool nodes_carry() const { return choice_.velocity_update == VelocityUpdate::fmpm || choice_.velocity_update == VelocityUpdate::pic; }
+    bool nodes_carry() const {
+        return choice_.velocity_update == VelocityUpdate::fmpm || choice_.velocity_update == VelocityUpdate::pic;
+    }
 
     /// Of the fields at the nodes, one entry each.
     struct Nodes {
@@ -34,13 +37,14 @@ class VelocityMapping {
     /// Of the points that carry w [J].
     double kinetic_energy(const std::vector<Vec2>& w, Team& team);
 
-    /// FMPM, between the accelerations of a step and what then prescribes velocities: takes the nodes' velocities, w + a dt, to what
-    /// FMPM makes of them. Returns the energy that is lost by that [J].
+    /// FMPM, between the accelerations of a step and what then prescribes velocities: takes the nodes' velocities, w + a dt, to
+    /// what FMPM makes of them. Returns the energy that is lost by that [J].
     double extrapolate(std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt, const Nodes& nodes);
 
-    /// FLIP and XPIC, at the end of a step: takes w on by the accelerations, and the nodes' velocities, A w + a dt, to the new A w.
-    /// Returns the energy that is lost by that [J].
-    double carry(std::vector<Vec2>& w, std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt, const Nodes& nodes);
+    /// FLIP and XPIC, at the end of a step: takes w on by the accelerations, and the nodes' velocities, A w + a dt, to the new A
+    /// w. Returns the energy that is lost by that [J].
+    double carry(std::vector<Vec2>& w, std::vector<Vec2>& velocity, const std::vector<Vec2>& acceleration, double dt,
+                 const Nodes& nodes);
 
     /// v becomes A v.
     void hand_back(std::vector<Vec2>& v, const Nodes& nodes);
@@ -52,7 +56,7 @@ class VelocityMapping {
     const Discretisation& body_;
     Strips strips_;
     std::vector<Vec2> sum_, term_, extrapolated_, from_points_;  // [fields] kept between calls, to be allocated once
-    std::vector<double> energy_;                  // [strips] [J]
+    std::vector<double> energy_;                                 // [strips] [J]
 };
 
-} // namespace crampfit
+}  // namespace crampfit

@@ -40,13 +40,12 @@ std::vector<double> angles(const BorderLine& border, const std::vector<double>& 
     for (int u = border.first; u < border.end(); ++u) {
         double mass = 0, x1 = 0, x2 = 0, y = 0, xy = 0;
         const auto add = [&](int k) {
-            const double x = k - u, weight = std::exp(-0.5 * x * x / (sigma * sigma)), value = apart[static_cast<std::size_t>(k - border.first)];
+            const double x = k - u, weight = std::exp(-0.5 * x * x / (sigma * sigma)),
+                         value = apart[static_cast<std::size_t>(k - border.first)];
             mass += weight, x1 += weight * x, x2 += weight * x * x, y += weight * value, xy += weight * x * value;
         };
-        for (int k = u; k <= u + reach && border.covers(k); ++k)
-            add(k);
-        for (int k = u - 1; k >= u - reach && border.covers(k); --k)
-            add(k);
+        for (int k = u; k <= u + reach && border.covers(k); ++k) add(k);
+        for (int k = u - 1; k >= u - reach && border.covers(k); --k) add(k);
         const double spread = mass * x2 - x1 * x1;
         const bool known = spread > 0.25 * sigma * sigma * mass * mass;  // a quarter of what the whole window has
         const double more = known ? (mass * xy - x1 * y) / spread : 0;
@@ -92,8 +91,7 @@ double angle_at(const std::vector<const Traced*>& covering, int u, double v, dou
         const double slope = std::tan(angle);
         if (outer == covering.end() || outer == covering.begin()) {
             const Traced::Foot foot = (outer == covering.end() ? covering.back() : covering.front())->foot(u, v, slope);
-            if (foot.met)
-                angle = before + std::clamp(2 - std::abs(v - foot.v) / ring_width, 0.0, 1.0) * (foot.angle - before);
+            if (foot.met) angle = before + std::clamp(2 - std::abs(v - foot.v) / ring_width, 0.0, 1.0) * (foot.angle - before);
             continue;
         }
         const Traced::Foot below = outer[-1]->foot(u, v, slope), above = (*outer)->foot(u, v, slope);
@@ -107,9 +105,11 @@ double angle_at(const std::vector<const Traced*>& covering, int u, double v, dou
 
 }  // namespace
 
-void turn_to_borders(OrientationField& field, const std::vector<BorderLine>& borders, const GrowthFrame& frame, double ring_width) {
+void turn_to_borders(OrientationField& field, const std::vector<BorderLine>& borders, const GrowthFrame& frame,
+                     double ring_width) {
     const double sigma = std::clamp(0.08 * ring_width, 4.0, 6.0);
-    const cv::Mat cos2 = frame.turn(field.full(field.cos2, frame.picture())), sin2 = frame.turn(field.full(field.sin2, frame.picture()));
+    const cv::Mat cos2 = frame.turn(field.full(field.cos2, frame.picture())),
+                  sin2 = frame.turn(field.full(field.sin2, frame.picture()));
     const int columns = frame.size().width;
     std::vector<Traced> all;
     for (const BorderLine& border : borders)
@@ -117,12 +117,12 @@ void turn_to_borders(OrientationField& field, const std::vector<BorderLine>& bor
     const auto covering = [&](int u) {
         std::vector<const Traced*> these;
         for (const Traced& one : all)
-            if (one.border.covers(u))
-                these.push_back(&one);
+            if (one.border.covers(u)) these.push_back(&one);
         std::ranges::sort(these, {}, [u](const Traced* one) { return one->border.at(u); });
         return these;
     };
-    const int lines = frame.across() ? field.cos2.rows : field.cos2.cols, nodes = frame.across() ? field.cos2.cols : field.cos2.rows;
+    const int lines = frame.across() ? field.cos2.rows : field.cos2.cols,
+              nodes = frame.across() ? field.cos2.cols : field.cos2.rows;
     const auto place = [&](int node) { return field.step * (node + 0.5) - 0.5; };
     for (int line = 0; line < lines; ++line) {
         const int u = std::clamp(static_cast<int>(std::lround(place(line))), 0, columns - 1);

@@ -26,13 +26,13 @@ Eigen::Vector4d parts(double d, double blur) {
 /// Width of the ring on one side of a border at a column; infinite where there is none.
 double width_beside(const std::vector<BorderLine>& borders, std::size_t border, int step, int u) {
     const auto other = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(border) + step);
-    if (other >= borders.size() || !borders[other].covers(u))
-        return std::numeric_limits<double>::infinity();
+    if (other >= borders.size() || !borders[other].covers(u)) return std::numeric_limits<double>::infinity();
     return std::abs(borders[other].at(u) - borders[border].at(u));
 }
 
 /// The value among some that makes a function least.
-template <class Function> double least(const std::vector<double>& values, const Function& function) {
+template <class Function>
+double least(const std::vector<double>& values, const Function& function) {
     return *std::ranges::min_element(values, {}, function);
 }
 
@@ -42,8 +42,7 @@ double BorderEdges::Stretch::distance(std::size_t bin) const { return (static_ca
 
 void BorderEdges::Stretch::narrow(double to) {
     const auto cut = static_cast<std::ptrdiff_t>((reach - to) / bin_width);
-    if (cut <= 0)
-        return;
+    if (cut <= 0) return;
     reach -= static_cast<double>(cut) * bin_width;
     sum = {sum.begin() + cut, sum.end() - cut};
     count = {count.begin() + cut, count.end() - cut};
@@ -59,8 +58,7 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
         for (int k = 0; k < count; ++k) {
             const int begin = border.first + columns * k / count, end = border.first + columns * (k + 1) / count;
             const int middle = (begin + end) / 2;
-            if (!border.covers(begin) || !border.covers(middle) || !border.covers(end - 1))
-                continue;
+            if (!border.covers(begin) || !border.covers(middle) || !border.covers(end - 1)) continue;
             const double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle);
             const double beside = std::min(before, after);
             if (!std::isfinite(beside) || beside < 4 * least_reach)
@@ -75,34 +73,29 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
             stretch.count.assign(bins, 0);
             int pixels = 0;
             for (int u = begin; u < end; u += step) {
-                if (!border.covers(u))
-                    continue;
+                if (!border.covers(u)) continue;
                 const double reach = stretch.reach / cosine;
                 for (int v = std::max(0, static_cast<int>(std::ceil(border.at(u) - reach)));
                      v <= std::min(gray.rows - 1, static_cast<int>(std::floor(border.at(u) + reach))); ++v) {
                     const auto bin = static_cast<std::size_t>(((v - border.at(u)) * cosine + stretch.reach) / bin_width);
-                    if (valid.at<float>(v, u) == 0 || bin >= bins)
-                        continue;
+                    if (valid.at<float>(v, u) == 0 || bin >= bins) continue;
                     stretch.sum[bin] += gray.at<float>(v, u);
                     ++stretch.count[bin];
                     ++pixels;
                 }
             }
-            if (pixels >= least_pixels)
-                stretches_[i].push_back(std::move(stretch));
+            if (pixels >= least_pixels) stretches_[i].push_back(std::move(stretch));
         }
     }
     std::vector<double> blurs, places;
     for (double blur = 0.3; blur < 3; blur *= 1.1)  // pixels; beyond half the reach a blur looks like a slope
         blurs.push_back(blur);
-    for (double place = -1; place < 1.01; place += 0.1)
-        places.push_back(place);
+    for (double place = -1; place < 1.01; place += 0.1) places.push_back(place);
     for (int round = 0; round < 3; ++round) {
         blur_ = least(blurs, [&](double blur) { return left(blur, place_); });
         place_ = least(places, [&](double place) { return left(blur_, place); });
         for (auto& border : stretches_)  // what is farther than the blur reaches tells nothing of it, and less of the ring's end
-            for (Stretch& stretch : border)
-                stretch.narrow(std::max(least_reach, 4 * blur_));
+            for (Stretch& stretch : border) stretch.narrow(std::max(least_reach, 4 * blur_));
     }
     std::vector<float> latewood, earlywood;
     for (const auto& border : stretches_)
@@ -120,8 +113,7 @@ BorderEdges::Fit BorderEdges::fit(const Stretch& stretch, double blur, double pl
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     double squares = 0;
     for (std::size_t bin = 0; bin < stretch.sum.size(); ++bin) {
-        if (stretch.count[bin] == 0)
-            continue;
+        if (stretch.count[bin] == 0) continue;
         const Eigen::Vector4d row = parts(stretch.distance(bin) - place, blur);
         normal += stretch.count[bin] * row * row.transpose();
         right += stretch.sum[bin] * row;
@@ -134,19 +126,16 @@ BorderEdges::Fit BorderEdges::fit(const Stretch& stretch, double blur, double pl
 double BorderEdges::left(double blur, double place) const {
     double sum = 0;
     for (const auto& border : stretches_)
-        for (const Stretch& stretch : border)
-            sum += fit(stretch, blur, place).left;
+        for (const Stretch& stretch : border) sum += fit(stretch, blur, place).left;
     return sum;
 }
 
 std::optional<BorderGrays> BorderEdges::at(std::size_t border, int column) const {
     const std::vector<Stretch>& all = stretches_[border];
-    if (all.empty())
-        return std::nullopt;
+    if (all.empty()) return std::nullopt;
     const auto away = [column](const Stretch& one) { return std::abs(one.column - column); };
     const Stretch& nearest = *std::ranges::min_element(all, {}, away);
-    if (blur_ > 0.5 * nearest.reach)
-        return std::nullopt;  // what looks like this is no jump
+    if (blur_ > 0.5 * nearest.reach) return std::nullopt;  // what looks like this is no jump
     return ends(nearest);
 }
 

@@ -34,8 +34,8 @@ class BorderEdges {
   private:
     /// Mean gray over the distance from a stretch of border.
     struct Stretch {
-        double column = 0;  // its middle
-        double reach = 0;   // [pixels], to either side
+        double column = 0;             // its middle
+        double reach = 0;              // [pixels], to either side
         double before = 0, after = 0;  // widths of the rings on either side [pixels]
         std::vector<double> sum;
         std::vector<int> count;

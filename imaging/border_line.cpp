@@ -17,14 +17,14 @@ constexpr double edge = 3;           // rows at the end of what is photographed 
 
 /// The way through `gain` [band x columns] that gathers most, moving at most one row a column and paying for each.
 std::vector<int> best_way(const cv::Mat& gain) {
-    constexpr float price = 3;  // of a row, against 1 for each column on the border: no stain is worth a turn, straightened rings hardly wave
+    // Of a row, against 1 for each column on the border: no stain is worth a turn, straightened rings hardly wave.
+    constexpr float price = 3;
     cv::Mat sum = gain.clone(), from = cv::Mat::zeros(gain.size(), CV_8S);
     for (int u = 1; u < gain.cols; ++u) {
         for (int j = 0; j < gain.rows; ++j) {
             float best = sum.at<float>(j, u - 1);
             for (const int move : {-1, 1}) {
-                if (j + move < 0 || j + move >= gain.rows || sum.at<float>(j + move, u - 1) - price <= best)
-                    continue;
+                if (j + move < 0 || j + move >= gain.rows || sum.at<float>(j + move, u - 1) - price <= best) continue;
                 best = sum.at<float>(j + move, u - 1) - price;
                 from.at<schar>(j, u) = static_cast<schar>(move);
             }
@@ -33,8 +33,7 @@ std::vector<int> best_way(const cv::Mat& gain) {
     }
     int j = 0;
     for (int i = 1; i < gain.rows; ++i)
-        if (sum.at<float>(i, gain.cols - 1) > sum.at<float>(j, gain.cols - 1))
-            j = i;
+        if (sum.at<float>(i, gain.cols - 1) > sum.at<float>(j, gain.cols - 1)) j = i;
     std::vector<int> way(gain.cols);
     for (int u = gain.cols - 1; u >= 0; --u) {
         way[u] = j;
@@ -48,10 +47,8 @@ double steepest_near(const cv::Mat& slope, int u, int row) {
     const auto at = [&](int j) { return slope.at<float>(j, u); };
     int top = -1;
     for (int j = std::max(row - 1, 1); j <= std::min(row + 1, slope.rows - 2); ++j)
-        if (at(j) > at(j - 1) && at(j) >= at(j + 1) && at(j) > (top < 0 ? 0.0f : at(top)))
-            top = j;
-    if (top < 0)
-        return row;
+        if (at(j) > at(j - 1) && at(j) >= at(j + 1) && at(j) > (top < 0 ? 0.0f : at(top))) top = j;
+    if (top < 0) return row;
     const double before = at(top - 1), here = at(top), after = at(top + 1);
     return top + 0.5 * (before - after) / (before - 2 * here + after);  // a parabola's top
 }
@@ -71,14 +68,13 @@ struct Band {
         cv::Mat inside(height(), columns(), CV_32F, cv::Scalar(0));
         for (int u = 0; u < columns(); ++u)
             for (int j = 0; j < height(); ++j)
-                if (row(u, j) >= 0 && row(u, j) < straight.rows)
-                    inside.at<float>(j, u) = straight.at<float>(row(u, j), u);
+                if (row(u, j) >= 0 && row(u, j) < straight.rows) inside.at<float>(j, u) = straight.at<float>(row(u, j), u);
         return inside;
     }
 };
 
-/// The median over the columns of their steepest rise. Columns without any do not count, such as beside a specimen that is narrower than its
-/// picture.
+/// The median over the columns of their steepest rise. Columns without any do not count, such as beside a specimen that is
+/// narrower than its picture.
 double usual_rise(const cv::Mat& slope) {
     cv::Mat highest;
     cv::reduce(slope, highest, 0, cv::REDUCE_MAX);
@@ -94,18 +90,16 @@ std::vector<double> lay(const cv::Mat& slope, const std::vector<RowRange>& photo
     cv::min(cv::max(gain, 0), 1.5, gain);
     for (int u = 0; u < band.columns(); ++u)
         for (int j = 0; j < band.height(); ++j)
-            if (!photographed[u].holds(band.row(u, j), edge))
-                gain.at<float>(j, u) = unseen;
+            if (!photographed[u].holds(band.row(u, j), edge)) gain.at<float>(j, u) = unseen;
     const std::vector<int> way = best_way(gain);
     cv::Mat rows(1, band.columns(), CV_32F);
-    for (int u = 0; u < band.columns(); ++u)
-        rows.at<float>(u) = static_cast<float>(steepest_near(slope, u, band.row(u, way[u])));
+    for (int u = 0; u < band.columns(); ++u) rows.at<float>(u) = static_cast<float>(steepest_near(slope, u, band.row(u, way[u])));
     cv::GaussianBlur(rows, rows, {0, 1}, 1.5, 1.5, cv::BORDER_REPLICATE);
     return {rows.begin<float>(), rows.end<float>()};
 }
 
-/// How gray rises down the columns of the finely straightened picture; 0 where that is not known. Where the LW of fine rings is but a few pixels
-/// wide, smoothing would move its steepest side away from it.
+/// How gray rises down the columns of the finely straightened picture; 0 where that is not known. Where the LW of fine rings is
+/// but a few pixels wide, smoothing would move its steepest side away from it.
 cv::Mat slope_across(const StraightWood& wood, double room) {
     const StraightPicture fine = wood.blurred_along(2.0);
     const double sigma = std::clamp(0.04 * room, 0.3, 1.0);
@@ -118,7 +112,8 @@ cv::Mat slope_across(const StraightWood& wood, double room) {
 }
 
 /// A border in the frame from its rows in the straightened picture.
-BorderLine in_frame(const std::vector<double>& row, const std::vector<RowRange>& photographed, const cv::Mat& valid, const RingCoordinate& rings) {
+BorderLine in_frame(const std::vector<double>& row, const std::vector<RowRange>& photographed, const cv::Mat& valid,
+                    const RingCoordinate& rings) {
     constexpr double beyond = std::numeric_limits<double>::infinity();
     const int columns = static_cast<int>(row.size());
     BorderLine line{.first = columns, .v = {}, .support = 0};
@@ -130,38 +125,32 @@ BorderLine in_frame(const std::vector<double>& row, const std::vector<RowRange>&
             continue;
         }
         place[u] = std::clamp(rings.v(u, rings.lowest() + row[u]), 0.0, valid.rows - 1.0);
-        if (valid.at<float>(static_cast<int>(std::lround(place[u])), u) == 0)
-            continue;
+        if (valid.at<float>(static_cast<int>(std::lround(place[u])), u) == 0) continue;
         line.first = std::min(line.first, u);
         last = u;
     }
-    if (last >= line.first)
-        line.v.assign(place.begin() + line.first, place.begin() + last + 1);
+    if (last >= line.first) line.v.assign(place.begin() + line.first, place.begin() + last + 1);
     return line;
 }
 
 }  // namespace
 
-std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
-                                    const std::vector<BorderGuess>& guesses) {
+std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank,
+                                    const RingCoordinate& rings, const std::vector<BorderGuess>& guesses) {
     std::vector<float> rooms;
-    for (const BorderGuess& guess : guesses)
-        rooms.push_back(static_cast<float>(guess.room));
+    for (const BorderGuess& guess : guesses) rooms.push_back(static_cast<float>(guess.room));
     const cv::Mat slope = slope_across(wood, quantile(rooms, 0.5));
     std::vector<RowRange> photographed;
-    for (int u = 0; u < valid.cols; ++u)
-        photographed.push_back(photographed_rows(rings, blank, u));
+    for (int u = 0; u < valid.cols; ++u) photographed.push_back(photographed_rows(rings, blank, u));
     std::vector<float> rises;
-    for (const BorderGuess& guess : guesses)
-        rises.push_back(static_cast<float>(usual_rise(Band(guess).cut(slope))));
+    for (const BorderGuess& guess : guesses) rises.push_back(static_cast<float>(usual_rise(Band(guess).cut(slope))));
     const double least = std::max(least_rise * quantile(rises, 0.5), 1e-6);
     std::vector<BorderLine> borders;
     for (std::size_t i = 0; i < guesses.size(); ++i) {
         const std::vector<double> rows = lay(slope, photographed, guesses[i], std::max<double>(rises[i], least));
         BorderLine line = in_frame(rows, photographed, valid, rings);
         line.support = guesses[i].support;
-        if (line.v.size() > 1)
-            borders.push_back(std::move(line));
+        if (line.v.size() > 1) borders.push_back(std::move(line));
     }
     return borders;
 }

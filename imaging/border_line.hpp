@@ -9,8 +9,8 @@
 
 namespace crampfit {
 
-/// A ring's outer border in the growth frame: one place a column, from column `first` on. Where the border leaves what is photographed and
-/// comes back, v is infinite in between: minus towards the pith, plus towards the bark.
+/// A ring's outer border in the growth frame: one place a column, from column `first` on. Where the border leaves what is
+/// photographed and comes back, v is infinite in between: minus towards the pith, plus towards the bark.
 struct BorderLine {
     int first = 0;
     std::vector<double> v;  // [pixels]
@@ -28,9 +28,10 @@ struct BorderGuess {
     double support = 0;       // of the line
 };
 
-/// Lays borders through the steepest rises of gray near their guesses, by dynamic programming. What leaves what is photographed, or runs where
-/// nothing counts, is cut off. `valid` (0 or 1, float) and `blank` (255 where nothing is photographed) are in the frame.
-std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank, const RingCoordinate& rings,
-                                    const std::vector<BorderGuess>& guesses);
+/// Lays borders through the steepest rises of gray near their guesses, by dynamic programming. What leaves what is photographed,
+/// or runs where nothing counts, is cut off. `valid` (0 or 1, float) and `blank` (255 where nothing is photographed) are in the
+/// frame.
+std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank,
+                                    const RingCoordinate& rings, const std::vector<BorderGuess>& guesses);
 
 }  // namespace crampfit

@@ -13,8 +13,7 @@
 namespace crampfit {
 namespace {
 
-constexpr int border =
-    6;  // pixels from the outermost subsets to the picture's edge: room for smoothing and small displacements
+constexpr int border = 6;  // pixels from the outermost subsets to the picture's edge: room for smoothing and small displacements
 
 /// As many points as there is room for, with what is left over shared between both sides.
 PointLattice lattice_of(const FinePicture& picture, const CorrelateOptions& options) {
@@ -48,9 +47,8 @@ std::vector<PointStatus> usable_points(const FinePicture& picture, const std::ve
                                        const PointLattice& lattice, int subset) {
     const cv::Mat gray(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
     const SubsetSums sum(gray, subset / 2), squares(gray.mul(gray), subset / 2);
-    const cv::Mat inside = mask.empty()
-                               ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
-                               : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
+    const cv::Mat inside = mask.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
+                                        : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
     const SubsetSums masked(inside == 0, subset / 2);
     const double count = subset * subset;
     std::vector<PointStatus> usable;
@@ -69,16 +67,15 @@ std::vector<PointStatus> usable_points(const FinePicture& picture, const std::ve
 void require_contrast(const FinePicture& picture, const std::string& name) {
     const auto [least, most] = std::ranges::minmax_element(picture.gray);
     if (*least == *most)
-        throw InputError("command line", "picture", name,
-                         fmt::format("has gray {} only: there is nothing to follow", *least));
+        throw InputError("command line", "picture", name, fmt::format("has gray {} only: there is nothing to follow", *least));
 }
 
 /// A reference that can be followed.
 FinePicture checked(FinePicture picture, const CorrelateOptions& options, const std::string& name) {
     if (const int least = options.subset + 2 * border; picture.columns < least || picture.rows < least)
         throw InputError("command line", "reference", name,
-                         fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns,
-                                     picture.rows, options.subset, least, least));
+                         fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns, picture.rows,
+                                     options.subset, least, least));
     require_contrast(picture, name);
     return picture;
 }
@@ -90,10 +87,8 @@ constexpr double most_apart = 0.1;  // root mean square over a subset of motion 
 void drop_torn(std::vector<SubsetMatch>& matches) {
     std::vector<double> residuals;
     for (const SubsetMatch& match : matches)
-        if (match.status == PointStatus::ok)
-            residuals.push_back(match.residual);
-    if (residuals.empty())
-        return;
+        if (match.status == PointStatus::ok) residuals.push_back(match.residual);
+    if (residuals.empty()) return;
     const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
     std::ranges::nth_element(residuals, middle);
     const double noise = *middle;
@@ -109,12 +104,9 @@ void CorrelateOptions::validate() const {
     const auto fail = [](const char* option, int value, const char* rule) {
         throw InputError("command line", option, std::to_string(value), rule);
     };
-    if (subset < 5 || subset > 501 || subset % 2 == 0)
-        fail("--subset", subset, "must be an odd number of pixels from 5 to 501");
-    if (step < 1 || step > 1000)
-        fail("--step", step, "must be from 1 to 1000 pixels");
-    if (order != 1 && order != 2)
-        fail("--order", order, "must be 1 or 2");
+    if (subset < 5 || subset > 501 || subset % 2 == 0) fail("--subset", subset, "must be an odd number of pixels from 5 to 501");
+    if (step < 1 || step > 1000) fail("--step", step, "must be from 1 to 1000 pixels");
+    if (order != 1 && order != 2) fail("--order", order, "must be 1 or 2");
     if (!(smoothing >= 0 && smoothing <= 20))
         throw InputError("command line", "--smoothing", fmt::format("{}", smoothing), "must be from 0 to 20 pixels");
 }

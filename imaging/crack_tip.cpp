@@ -60,12 +60,10 @@ struct Line {
 /// All terms of the series at a place, the tip at the origin and the crack along the negative x axis.
 Term series(const Vec2& place) {
     const double r = place.norm() / unit;
-    if (r == 0)
-        return Term::Zero();
+    if (r == 0) return Term::Zero();
     // cos and sin of theta, theta / 2 and 3 theta / 2 without an angle: half angles by their squares, others by sums.
     const double c = place.x() / (r * unit), s = place.y() / (r * unit);
-    const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)),
-                 sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
+    const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)), sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
     const double c3 = c * ch - s * sh, s3 = s * ch + c * sh;
     const double root = std::sqrt(r), root3 = r * root;
     return {1,
@@ -85,9 +83,7 @@ Term series(const Vec2& place) {
 }
 
 /// Half the width of the strip about a crack in which subsets reach over it [px].
-double clearance(int subset, double angle) {
-    return 0.5 * subset * (std::abs(std::cos(angle)) + std::abs(std::sin(angle))) + 1;
-}
+double clearance(int subset, double angle) { return 0.5 * subset * (std::abs(std::cos(angle)) + std::abs(std::sin(angle))) + 1; }
 
 /// Whether a subset reaches over the crack or its tip; `local` is its place from the tip.
 bool reaches_over(const Vec2& local, double width) {
@@ -131,16 +127,14 @@ double scan_score(const std::vector<Sample>& samples, const Line& line, double a
     int count = 0;
     for (const Sample& sample : samples) {
         const Vec2 local = line.local(sample.place);
-        if (local.norm() < about_tip || (local.x() < 0 && std::abs(local.y()) < about_crack))
-            continue;
+        if (local.norm() < about_tip || (local.x() < 0 && std::abs(local.y()) < about_crack)) continue;
         const Term term = series(local);
         normal.selfadjointView<Eigen::Lower>().rankUpdate(term.transpose());
         right += term.transpose() * sample.displacement.transpose();
         squares += sample.displacement.squaredNorm();
         ++count;
     }
-    if (count < least_points)
-        return std::numeric_limits<double>::infinity();
+    if (count < least_points) return std::numeric_limits<double>::infinity();
     const auto factor = normal.selfadjointView<Eigen::Lower>().ldlt();
     const double left = squares - right.cwiseProduct(factor.solve(right)).sum();
     return std::isfinite(left) ? left / (2 * (count - terms)) : std::numeric_limits<double>::infinity();
@@ -173,8 +167,7 @@ double jump_at(const std::vector<Sample>& samples, const Line& line, int subset)
     const double width = clearance(subset, line.angle);
     for (const Sample& sample : samples) {
         const Vec2 local = line.local(sample.place);
-        if (std::abs(local.x()) > subset || std::abs(local.y()) < width || std::abs(local.y()) > width + subset)
-            continue;
+        if (std::abs(local.x()) > subset || std::abs(local.y()) < width || std::abs(local.y()) > width + subset) continue;
         const std::size_t side = local.y() > 0;
         sum[side] += sample.displacement;
         ++count[side];
@@ -182,15 +175,14 @@ double jump_at(const std::vector<Sample>& samples, const Line& line, int subset)
     return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : 0;
 }
 
-/// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip by up to half its
-/// width: the tip is taken in between. None where the last is the last of the lattice: then the tip is farther on.
+/// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip
+/// by up to half its width: the tip is taken in between. None where the last is the last of the lattice: then the tip is farther
+/// on.
 std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<Sample>& samples, const FieldGeometry& geometry) {
     Vec2 middle = Vec2::Zero();
-    for (const Vec2& place : torn)
-        middle += place / static_cast<double>(torn.size());
+    for (const Vec2& place : torn) middle += place / static_cast<double>(torn.size());
     Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-    for (const Vec2& place : torn)
-        spread += (place - middle) * (place - middle).transpose();
+    for (const Vec2& place : torn) spread += (place - middle) * (place - middle).transpose();
     Vec2 along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1);
     double first = 0, last = 0;
     for (const Vec2& place : torn) {
@@ -198,15 +190,15 @@ std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<
         last = std::max(last, along.dot(place - middle));
     }
     const double angle = std::atan2(along.y(), along.x());
-    if (jump_at(samples, {middle + last * along, angle}, geometry.subset) > jump_at(samples, {middle + first * along, angle}, geometry.subset)) {
+    if (jump_at(samples, {middle + last * along, angle}, geometry.subset) >
+        jump_at(samples, {middle + first * along, angle}, geometry.subset)) {
         along = -along;
         last = -first;
     }
     const PointLattice& lattice = geometry.lattice;
     const Vec2 beyond = middle + (last + lattice.step) * along - Vec2(lattice.first_x, lattice.first_y);
     const Vec2 extent = lattice.step * Vec2(lattice.columns - 1, lattice.rows - 1);
-    if (beyond.minCoeff() < 0 || (extent - beyond).minCoeff() < 0)
-        return std::nullopt;
+    if (beyond.minCoeff() < 0 || (extent - beyond).minCoeff() < 0) return std::nullopt;
     return Line{middle + (last - 0.25 * geometry.subset) * along, std::atan2(along.y(), along.x())};
 }
 
@@ -214,14 +206,11 @@ std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<
 Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subset) {
     std::vector<Sample> samples;
     const std::size_t every = std::max<std::size_t>(1, all.size() / scan_points);
-    for (std::size_t i = every / 2; i < all.size(); i += every)
-        samples.push_back(all[i]);
+    for (std::size_t i = every / 2; i < all.size(); i += every) samples.push_back(all[i]);
     // The score is a small difference of large sums: the mean motion says nothing and is taken off.
     Vec2 mean = Vec2::Zero();
-    for (const Sample& sample : samples)
-        mean += sample.displacement / static_cast<double>(samples.size());
-    for (Sample& sample : samples)
-        sample.displacement -= mean;
+    for (const Sample& sample : samples) mean += sample.displacement / static_cast<double>(samples.size());
+    for (Sample& sample : samples) sample.displacement -= mean;
 
     const double across = lattice.step * (lattice.columns - 1), down = lattice.step * (lattice.rows - 1);
     const double spacing = std::max({across, down, 1.0}) / scan_places;
@@ -248,24 +237,19 @@ void turn(const std::vector<Sample>& samples, Line& line, int subset, double ran
     const int count = static_cast<int>(std::lround(2 * range / step)) + 1;
     std::vector<double> scores;
     for (int i = 0; i < count; ++i)
-        scores.push_back(
-            scan_score(samples, {line.tip, line.angle - range + i * step}, clearance(subset, line.angle), 0));
+        scores.push_back(scan_score(samples, {line.tip, line.angle - range + i * step}, clearance(subset, line.angle), 0));
     const auto best = static_cast<int>(std::ranges::min_element(scores) - scores.begin());
     const double good = as_good * scores[static_cast<std::size_t>(best)];
     int first = best, last = best;
-    while (first > 0 && scores[static_cast<std::size_t>(first - 1)] <= good)
-        --first;
-    while (last + 1 < count && scores[static_cast<std::size_t>(last + 1)] <= good)
-        ++last;
+    while (first > 0 && scores[static_cast<std::size_t>(first - 1)] <= good) --first;
+    while (last + 1 < count && scores[static_cast<std::size_t>(last + 1)] <= good) ++last;
     line.angle += (first + last) * step / 2 - range;
 }
 
 /// Levenberg-Marquardt over the tip, the coefficients of the series eliminated (variable projection, Golub and Pereyra
 /// 1973), derivatives by central differences. Gives the tip's covariance, were the displacements independent [px^2].
 Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
-    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd {
-        return residuals(samples, {tip, line.angle}).reshaped();
-    };
+    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd { return residuals(samples, {tip, line.angle}).reshaped(); };
     Eigen::VectorXd now = left(line.tip);
     double damping = 1e-3;
     Eigen::Matrix2d normal;
@@ -279,8 +263,7 @@ Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
         Eigen::Matrix2d damped = normal;
         damped.diagonal() *= 1 + damping;
         const Vec2 step = -damped.ldlt().solve(jacobian.transpose() * now);
-        if (!step.allFinite() || step.norm() < settled || damping > most_damping)
-            break;
+        if (!step.allFinite() || step.norm() < settled || damping > most_damping) break;
         const Vec2 tip = line.tip + step * std::min(1.0, longest_step / step.norm());
         const Eigen::VectorXd then = left(tip);
         if (then.squaredNorm() < now.squaredNorm()) {
@@ -316,8 +299,7 @@ double length_in_picture(const Line& line, int columns, int rows) {
     const Vec2 back = -line.direction();
     double length = std::numeric_limits<double>::infinity();
     const auto to_side = [&](double from, double along, double high) {
-        if (along != 0)
-            length = std::min(length, ((along > 0 ? high : -0.5) - from) / along);
+        if (along != 0) length = std::min(length, ((along > 0 ? high : -0.5) - from) / along);
     };
     to_side(line.tip.x(), back.x(), columns - 0.5);
     to_side(line.tip.y(), back.y(), rows - 0.5);
@@ -334,8 +316,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
             samples.push_back({Vec2(lattice.x(point), lattice.y(point)), Vec2(field.u[i], field.v[i])});
     CrackTip found;
     found.status = TipStatus::too_few_points;
-    if (static_cast<int>(samples.size()) < 2 * least_points)
-        return found;
+    if (static_cast<int>(samples.size()) < 2 * least_points) return found;
 
     Line line = scan(samples, lattice, geometry.subset);
     Eigen::Matrix2d covariance;
@@ -348,8 +329,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
          {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
         turn(within(samples, line.tip, radius), line, geometry.subset, range, range / 12);
         const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, geometry.subset);
-        if (static_cast<int>(clear.size()) < least_points)
-            return found;
+        if (static_cast<int>(clear.size()) < least_points) return found;
         covariance = refine(clear, line);
     }
     // In wood whose rings differ much in stiffness the series may fit better elsewhere than at the crack.
@@ -363,11 +343,10 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         }
         line = *torn_line;
     }
-    const bool inside = line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 &&
-                        line.tip.y() <= geometry.rows - 1;
+    const bool inside =
+        line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 && line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
-    if (static_cast<int>(clear.size()) < least_points)
-        return found;
+    if (static_cast<int>(clear.size()) < least_points) return found;
     if (!(gain(clear, line) > least_gain)) {
         found.status = TipStatus::no_crack;
         return found;

@@ -20,8 +20,8 @@ struct FieldGeometry {
 /// constant is needed and orthotropic wood fits about as well. The place of the tip and the crack's direction are what
 /// leaves the smallest sum of squares: sought on a coarse grid over the whole field, then in turn by finer angles and
 /// by Levenberg-Marquardt for the tip, at last over a disc around it. Subsets that reach over the crack or the tip take
-/// no part. Where that line misses most of the subsets that were torn, as in strongly layered wood, the crack is laid through these and
-/// ends with the last of them, to a quarter of a subset.
+/// no part. Where that line misses most of the subsets that were torn, as in strongly layered wood, the crack is laid through
+/// these and ends with the last of them, to a quarter of a subset.
 CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field);
 
 }  // namespace crampfit

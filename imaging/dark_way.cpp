@@ -11,16 +11,16 @@
 namespace crampfit {
 namespace {
 
-constexpr int tolerance = 3;           // of motion that the alignment does not follow [px]
-constexpr double least_dark = 4;       // of a crack's pixels, in standard deviations of what is left elsewhere
-constexpr double least_share = 0.04;   // of them, of the reference's mean gray
-constexpr double least_seed = 2;       // of a crack's darkest pixel, in the least of its pixels
-constexpr double stands_out = 3;       // of a crack, against the strongest line that brightens
-constexpr double least_length = 12;    // of a crack [px]
-constexpr double least_slender = 4;    // length over width
-constexpr double longest_gap = 30;     // in a line that is broken [px]
-constexpr double least_cosine = 0.8;   // of the turn that it may make there
-constexpr int heading = 25;            // of a line's last stretch, that says how it goes on [px]
+constexpr int tolerance = 3;                 // of motion that the alignment does not follow [px]
+constexpr double least_dark = 4;             // of a crack's pixels, in standard deviations of what is left elsewhere
+constexpr double least_share = 0.04;         // of them, of the reference's mean gray
+constexpr double least_seed = 2;             // of a crack's darkest pixel, in the least of its pixels
+constexpr double stands_out = 3;             // of a crack, against the strongest line that brightens
+constexpr double least_length = 12;          // of a crack [px]
+constexpr double least_slender = 4;          // length over width
+constexpr double longest_gap = 30;           // in a line that is broken [px]
+constexpr double least_cosine = 0.8;         // of the turn that it may make there
+constexpr int heading = 25;                  // of a line's last stretch, that says how it goes on [px]
 constexpr double at_border = 2 * tolerance;  // from here to the border a line is taken to go on [px]
 
 cv::Mat disk(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
@@ -30,10 +30,8 @@ double robust_deviation(const cv::Mat& values, const cv::Mat& counts) {
     const int every = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(values.total()) / 1e5)));
     for (int y = 0; y < values.rows; y += every)
         for (int x = 0; x < values.cols; x += every)
-            if (counts.at<std::uint8_t>(y, x))
-                sizes.push_back(std::abs(values.at<float>(y, x)));
-    if (sizes.empty())
-        return 0;
+            if (counts.at<std::uint8_t>(y, x)) sizes.push_back(std::abs(values.at<float>(y, x)));
+    if (sizes.empty()) return 0;
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::ranges::nth_element(sizes, middle);
     return 1.4826 * static_cast<double>(*middle);
@@ -62,10 +60,8 @@ Patches find_patches(const cv::Mat& excess, double least) {
             }
     patches.score[0] = 0;
     for (int i = 1; i < count; ++i) {
-        if (peak[i] <= least_seed * least)
-            patches.score[i] = 0;
-        if (patches.score[i] > patches.score[patches.strongest])
-            patches.strongest = i;
+        if (peak[i] <= least_seed * least) patches.score[i] = 0;
+        if (patches.score[i] > patches.score[patches.strongest]) patches.strongest = i;
     }
     return patches;
 }
@@ -76,7 +72,8 @@ struct Contrast {
     bool is_crack() const { return dark.score[dark.strongest] > stands_out * bright.score[bright.strongest]; }
 };
 
-Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& counts, const cv::Mat& inner, double least, int within) {
+Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& counts, const cv::Mat& inner, double least,
+                 int within) {
     cv::Mat lowest = before.clone(), highest = before.clone();
     lowest.setTo(std::numeric_limits<float>::max(), counts == 0);  // a dark margin must not hide a crack that runs into it
     highest.setTo(std::numeric_limits<float>::lowest(), counts == 0);
@@ -92,7 +89,8 @@ Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& count
 class Ways {
   public:
     Ways(const cv::Mat& mask, const cv::Mat& to_rim, cv::Point from)
-        : cost_(mask.size(), CV_64F, cv::Scalar(std::numeric_limits<double>::infinity())), came_(mask.size(), CV_8S, cv::Scalar(-1)) {
+        : cost_(mask.size(), CV_64F, cv::Scalar(std::numeric_limits<double>::infinity())),
+          came_(mask.size(), CV_8S, cv::Scalar(-1)) {
         using Item = std::pair<double, std::pair<int, int>>;
         std::priority_queue<Item, std::vector<Item>, std::greater<>> open;
         cost_.at<double>(from) = 0;
@@ -101,12 +99,10 @@ class Ways {
             const auto [cost, place] = open.top();
             open.pop();
             const cv::Point here(place.second, place.first);
-            if (cost > cost_.at<double>(here))
-                continue;
+            if (cost > cost_.at<double>(here)) continue;
             for (int i = 0; i < 8; ++i) {
                 const cv::Point next = here + steps[i];
-                if (!cv::Rect({0, 0}, mask.size()).contains(next) || !mask.at<std::uint8_t>(next))
-                    continue;
+                if (!cv::Rect({0, 0}, mask.size()).contains(next) || !mask.at<std::uint8_t>(next)) continue;
                 const double then = cost + (i < 4 ? 1 : std::sqrt(2.0)) * (1 + 2 / to_rim.at<float>(next));
                 if (then < cost_.at<double>(next)) {
                     cost_.at<double>(next) = then;
@@ -138,7 +134,8 @@ class Ways {
     }
 
   private:
-    inline static const std::array<cv::Point, 8> steps{cv::Point{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}};
+    inline static const std::array<cv::Point, 8> steps{cv::Point{1, 0}, {-1, 0}, {0, 1},  {0, -1},
+                                                       {1, 1},          {1, -1}, {-1, 1}, {-1, -1}};
     cv::Mat cost_, came_;
 };
 
@@ -167,8 +164,7 @@ std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& way, int reach
     for (int i = 0; i < count; ++i) {
         const int side = std::min({reach, i, count - 1 - i});
         cv::Point2d sum(0, 0);
-        for (int j = i - side; j <= i + side; ++j)
-            sum += way[static_cast<std::size_t>(j)];
+        for (int j = i - side; j <= i + side; ++j) sum += way[static_cast<std::size_t>(j)];
         smooth.push_back(sum / (2.0 * side + 1));
     }
     return smooth;
@@ -176,8 +172,7 @@ std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& way, int reach
 
 double mean_of(const std::vector<double>& values, std::size_t from, std::size_t to) {
     double sum = 0;
-    for (std::size_t i = from; i < to; ++i)
-        sum += values[i];
+    for (std::size_t i = from; i < to; ++i) sum += values[i];
     return sum / static_cast<double>(to - from);
 }
 
@@ -194,8 +189,8 @@ cv::Point mouth_at_border(const cv::Mat& to_rim, const cv::Point& corner, const 
     return mouth;
 }
 
-/// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack does; else the
-/// end that is clearly wider; else the one nearer to the border.
+/// Which end of a line that lies inside the picture is its mouth: where the reference goes on dark, as a notch or an older crack
+/// does; else the end that is clearly wider; else the one nearer to the border.
 bool back_is_mouth(const DarkWay& way, const cv::Mat& gray, bool back_is_nearer) {
     const auto beyond = [&](bool back) {
         const cv::Point2d end = back ? way.points.back() : way.points.front(), d = direction_at(way.points, back, heading);
@@ -206,12 +201,10 @@ bool back_is_mouth(const DarkWay& way, const cv::Mat& gray, bool back_is_nearer)
         return darkest;
     };
     const double front = beyond(false), back = beyond(true);
-    if (std::min(front, back) < 0.6 * std::max(front, back))
-        return back < front;
+    if (std::min(front, back) < 0.6 * std::max(front, back)) return back < front;
     const std::size_t count = way.points.size(), part = std::max<std::size_t>(1, count / 4);
     const double wide_front = mean_of(way.half_width, 0, part), wide_back = mean_of(way.half_width, count - part, count);
-    if (std::min(wide_front, wide_back) < 0.8 * std::max(wide_front, wide_back))
-        return wide_back > wide_front;
+    if (std::min(wide_front, wide_back) < 0.8 * std::max(wide_front, wide_back)) return wide_back > wide_front;
     return back_is_nearer;
 }
 
@@ -242,17 +235,17 @@ DarkWay middle_of(const cv::Mat& set, const Ground& ground) {
     return way;
 }
 
-/// The nearest pixel of another patch that a line goes on to from one of its ends; the place itself where there is none. Patches in `taken`
-/// are the line's own.
-std::pair<cv::Point, int> next_patch(const Patches& patches, const std::vector<char>& taken, const cv::Point2d& end, const cv::Point2d& onward) {
+/// The nearest pixel of another patch that a line goes on to from one of its ends; the place itself where there is none. Patches
+/// in `taken` are the line's own.
+std::pair<cv::Point, int> next_patch(const Patches& patches, const std::vector<char>& taken, const cv::Point2d& end,
+                                     const cv::Point2d& onward) {
     std::pair<cv::Point, int> best{cv::Point(end), 0};
     double nearest = longest_gap;
     const int reach = static_cast<int>(longest_gap), x0 = static_cast<int>(end.x), y0 = static_cast<int>(end.y);
     for (int y = std::max(0, y0 - reach); y <= std::min(patches.numbers.rows - 1, y0 + reach); ++y)
         for (int x = std::max(0, x0 - reach); x <= std::min(patches.numbers.cols - 1, x0 + reach); ++x) {
             const int patch = patches.numbers.at<int>(y, x);
-            if (patch == 0 || taken[patch] || patches.score[patch] == 0)
-                continue;
+            if (patch == 0 || taken[patch] || patches.score[patch] == 0) continue;
             const cv::Point2d offset = cv::Point2d(x, y) - end;
             const double distance = cv::norm(offset);
             if (distance < nearest && offset.dot(onward) > least_cosine * distance) {
@@ -274,8 +267,7 @@ cv::Mat join_patches(const Patches& patches, const Ground& ground) {
         for (const bool back : {false, true}) {
             const cv::Point2d end = back ? way.points.back() : way.points.front();
             const auto [place, patch] = next_patch(patches, taken, end, direction_at(way.points, back, heading));
-            if (patch == 0)
-                continue;
+            if (patch == 0) continue;
             taken[patch] = 1;
             joined |= patches.numbers == patch;
             cv::line(joined, end, place, cv::Scalar(255), 2);
@@ -287,13 +279,11 @@ cv::Mat join_patches(const Patches& patches, const Ground& ground) {
 
 /// The middle of the strongest line that has darkened, where it is long and slender.
 std::optional<DarkWay> line_in(const Contrast& contrast, const Ground& ground) {
-    if (contrast.dark.strongest == 0)
-        return std::nullopt;
+    if (contrast.dark.strongest == 0) return std::nullopt;
     const cv::Mat joined = join_patches(contrast.dark, ground);
     const DarkWay way = middle_of(joined, ground);
     const double length = static_cast<double>(way.points.size()), width = cv::countNonZero(joined) / length;
-    if (length < std::max(least_length, least_slender * width))
-        return std::nullopt;
+    if (length < std::max(least_length, least_slender * width)) return std::nullopt;
     return way;
 }
 
@@ -314,18 +304,16 @@ std::optional<DarkWay> find_dark_way(const cv::Mat& reference, const cv::Mat& se
     const Ground ground = ground_of(before, counts);
     const Contrast contrast = compare(before, now, counts, inner, least, tolerance);
     const std::optional<DarkWay> way = line_in(contrast, ground);
-    if (!way)
-        return std::nullopt;
-    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well. Where the
-    // specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the crack.
+    if (!way) return std::nullopt;
+    // The wood beside a wide crack has moved by half its width, and where rings run along it that darkens and brightens as well.
+    // Where the specimen has come apart all of it has moved, and only what is darker than all wood that may lie there now is the
+    // crack.
     const int opened = static_cast<int>(std::ceil(*std::ranges::max_element(way->half_width)));
     const bool apart = opened > tolerance && !way->ends_inside;
-    if (!apart && contrast.is_crack())
-        return way;
+    if (!apart && contrast.is_crack()) return way;
     const Contrast farther = compare(before, now, counts, inner, least, tolerance + opened);
     if (apart && farther.is_crack())
-        if (const std::optional<DarkWay> clear = line_in(farther, ground))
-            return clear;
+        if (const std::optional<DarkWay> clear = line_in(farther, ground)) return clear;
     return contrast.is_crack() || farther.is_crack() ? way : std::nullopt;
 }
 

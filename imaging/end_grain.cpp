@@ -63,9 +63,7 @@ class Appearance {
 
   private:
     /// How many things of a size stand side by side around the outermost ring.
-    std::int64_t around(double spacing) const {
-        return std::max<std::int64_t>(1, std::llround(2 * pi * outermost_ / spacing));
-    }
+    std::int64_t around(double spacing) const { return std::max<std::int64_t>(1, std::llround(2 * pi * outermost_ / spacing)); }
 
     /// Cells stand in files that run along the rays.
     double brightness_change(const RingGeometry::Place& place) const {
@@ -94,8 +92,7 @@ class Appearance {
             const double centre = static_cast<double>(sector) + random_.uniform(ray_place, ray);
             const double offset = (turn - centre) * sector_width / seen_width;
             const double in_plane = random_.smooth(ray_plane + 1000 * (ray + 1), place.distance / options_.ray_length);
-            cover =
-                std::max(cover, std::exp(-4 * std::numbers::ln2 * offset * offset) * std::clamp(in_plane, 0.0, 1.0));
+            cover = std::max(cover, std::exp(-4 * std::numbers::ln2 * offset * offset) * std::clamp(in_plane, 0.0, 1.0));
         }
         return cover * options_.ray_width / seen_width;
     }
@@ -136,10 +133,8 @@ void EndGrainOptions::validate() const {
     require(std::isfinite(pith.x()) && std::isfinite(pith.y()) && pith.norm() < 1e6 * size.norm(), "pith", pith.norm(),
             "must lie within a million sizes of the block");
     require(positive(period) && period >= pixel, "period", period, "must be at least one pixel");
-    require(not_negative(period_sd) && period_sd <= period / 2, "period_sd", period_sd,
-            "must lie within 0 and half a period");
-    require(latewood_fraction > 0 && latewood_fraction < 1, "latewood_fraction", latewood_fraction,
-            "must lie within 0 and 1");
+    require(not_negative(period_sd) && period_sd <= period / 2, "period_sd", period_sd, "must lie within 0 and half a period");
+    require(latewood_fraction > 0 && latewood_fraction < 1, "latewood_fraction", latewood_fraction, "must lie within 0 and 1");
     require(not_negative(latewood_fraction_sd) &&
                 std::sqrt(3.0) * latewood_fraction_sd < std::min(latewood_fraction, 1 - latewood_fraction),
             "latewood_fraction_sd", latewood_fraction_sd,
@@ -153,8 +148,7 @@ void EndGrainOptions::validate() const {
     require(not_negative(ray_width), "ray_width", ray_width, "must be 0 or a length");
     require(positive(ray_length), "ray_length", ray_length, "must be a positive length");
     require(ray_contrast >= 0 && ray_contrast <= 1, "ray_contrast", ray_contrast, "must lie within 0 and 1");
-    const std::pair<const char*, const Bgr&> colours[] = {
-        {"earlywood", earlywood}, {"latewood", latewood}, {"ray", ray}};
+    const std::pair<const char*, const Bgr&> colours[] = {{"earlywood", earlywood}, {"latewood", latewood}, {"ray", ray}};
     for (const auto& [name, colour] : colours) {
         for (const double channel : colour) {
             require(channel >= 0 && channel <= 255, name, channel, "must lie within 0 and 255");
@@ -195,8 +189,7 @@ EndGrain grow_end_grain(const EndGrainOptions& options) {
             const double degree = mean_degree(rings, place, options.pixel);
             const double light = 1 + options.illumination * (position.x() / options.size.x() - 0.5);
             for (const double channel : appearance.colour(place, degree)) {
-                grown.bgr.push_back(
-                    to_byte(light * channel + options.noise * random.normal(pixel_noise, grown.bgr.size())));
+                grown.bgr.push_back(to_byte(light * channel + options.noise * random.normal(pixel_noise, grown.bgr.size())));
             }
             const double direction = std::atan2(place.gradient.y(), place.gradient.x());
             grown.degree.push_back(static_cast<float>(degree));

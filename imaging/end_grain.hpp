@@ -66,9 +66,9 @@ struct EndGrain {
     std::vector<std::uint8_t> bgr;   // [rows x columns x 3], row 0 at the top
     std::vector<std::uint8_t> gray;  // [rows x columns], BT.601 weights
     std::vector<float> degree;       // [rows x columns] mean density degree over the pixel, 0 (EW) to 1 (LW)
-    Specimen truth;  // `degree` as classes EW and LW with their grade, and the radial direction: the normal
-                     // to the rings
-    std::vector<GrowthRing> rings;  // from the inside out
+    Specimen truth;                  // `degree` as classes EW and LW with their grade, and the radial direction: the normal
+                                     // to the rings
+    std::vector<GrowthRing> rings;   // from the inside out
     std::vector<RingBorder> borders;
 };
 

@@ -25,8 +25,7 @@ Range range_of(const std::vector<double>& values) {
     Range range{1, 0};
     for (const double value : values)
         if (!std::isnan(value))
-            range = range.low > range.high ? Range{value, value}
-                                           : Range{std::min(range.low, value), std::max(range.high, value)};
+            range = range.low > range.high ? Range{value, value} : Range{std::min(range.low, value), std::max(range.high, value)};
     return range;
 }
 
@@ -41,8 +40,7 @@ cv::Mat faded(const FinePicture& picture) {
 /// All colours from low to high, a column each.
 cv::Mat colour_scale() {
     cv::Mat ramp(1, 256, CV_8U), colours;
-    for (int i = 0; i < 256; ++i)
-        ramp.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
+    for (int i = 0; i < 256; ++i) ramp.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
     cv::applyColorMap(ramp, colours, cv::COLORMAP_VIRIDIS);
     return colours;
 }
@@ -52,16 +50,14 @@ void draw_legend(cv::Mat& map, const cv::Mat& colours, const std::string& name, 
     cv::Mat bar;
     cv::resize(colours, bar, {map.cols - 20, 10}, 0, 0, cv::INTER_LINEAR);
     bar.copyTo(legend(cv::Rect(10, 4, bar.cols, bar.rows)));
-    const std::string text = range.low > range.high
-                                 ? name + ": no point was followed"
-                                 : fmt::format("{} from {:.4g} to {:.4g} px", name, range.low, range.high);
+    const std::string text = range.low > range.high ? name + ": no point was followed"
+                                                    : fmt::format("{} from {:.4g} to {:.4g} px", name, range.low, range.high);
     cv::putText(legend, text, {10, 31}, cv::FONT_HERSHEY_SIMPLEX, 0.45, {0, 0, 0}, 1, cv::LINE_AA);
 }
 
 cv::Mat draw_map(const FinePicture& reference, const PointLattice& lattice, const std::vector<double>& values,
                  const std::string& name) {
-    cv::Mat map(reference.rows + legend_height, std::max(reference.columns, least_width), CV_8UC3,
-                cv::Scalar::all(255));
+    cv::Mat map(reference.rows + legend_height, std::max(reference.columns, least_width), CV_8UC3, cv::Scalar::all(255));
     cv::Mat picture = map(cv::Rect(0, 0, reference.columns, reference.rows));
     faded(reference).copyTo(picture);
     const cv::Mat colours = colour_scale();
@@ -109,17 +105,14 @@ void draw_track(const FinePicture& image, const std::vector<CrackTip>& tips, con
         return cv::Point(static_cast<int>(std::lround(place.x())), static_cast<int>(std::lround(place.y())));
     };
     for (const CrackTip& tip : tips)
-        if (tip.status == TipStatus::ok)
-            cv::circle(drawing, pixel(tip.tip), 3, {200, 80, 0}, 1, cv::LINE_AA);
+        if (tip.status == TipStatus::ok) cv::circle(drawing, pixel(tip.tip), 3, {200, 80, 0}, 1, cv::LINE_AA);
     const CrackTip& last = tips.back();
     std::vector<Vec2> way = last.way;
     if (last.status == TipStatus::ok) {
         cv::drawMarker(drawing, pixel(last.tip), {0, 0, 220}, cv::MARKER_CROSS, 15, 2);
-        if (way.empty())
-            way = {last.tip - last.length * Vec2(std::cos(last.angle), std::sin(last.angle)), last.tip};
+        if (way.empty()) way = {last.tip - last.length * Vec2(std::cos(last.angle), std::sin(last.angle)), last.tip};
     }
-    for (std::size_t i = 1; i < way.size(); ++i)
-        cv::line(drawing, pixel(way[i - 1]), pixel(way[i]), {0, 0, 220}, 1, cv::LINE_AA);
+    for (std::size_t i = 1; i < way.size(); ++i) cv::line(drawing, pixel(way[i - 1]), pixel(way[i]), {0, 0, 220}, 1, cv::LINE_AA);
     write_drawing(drawing, file);
 }
 

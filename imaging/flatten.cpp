@@ -29,8 +29,7 @@ cv::Mat flatten(const cv::Mat& gray, const cv::Mat& valid) {
     Terms right = Terms::Zero();
     for (int y = 0; y < gray.rows; y += step) {
         for (int x = 0; x < gray.cols; x += step) {
-            if (!valid.empty() && valid.at<float>(y, x) == 0)
-                continue;
+            if (!valid.empty() && valid.at<float>(y, x) == 0) continue;
             const Terms here = terms_at(x, y, gray.size());
             normal += here * here.transpose();
             right += here * std::log(std::max<double>(gray.at<float>(y, x), darkest));
@@ -42,7 +41,8 @@ cv::Mat flatten(const cv::Mat& gray, const cv::Mat& valid) {
     cv::parallel_for_({0, gray.rows}, [&](const cv::Range& rows) {
         for (int y = rows.start; y < rows.end; ++y)
             for (int x = 0; x < gray.cols; ++x)
-                flat.at<float>(y, x) = gray.at<float>(y, x) * static_cast<float>(std::exp(-light.dot(terms_at(x, y, gray.size()))));
+                flat.at<float>(y, x) =
+                    gray.at<float>(y, x) * static_cast<float>(std::exp(-light.dot(terms_at(x, y, gray.size()))));
     });
     return flat;
 }

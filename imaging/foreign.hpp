@@ -9,17 +9,17 @@ namespace crampfit {
 
 /// What to tell other things from wood by, all in the growth frame.
 struct WoodView {
-    const cv::Mat& gray;    // float, 0..1
-    const cv::Mat& bgr;     // blue, green, red, float, 0..1; empty: the picture is gray
-    const cv::Mat& around;  // gray of the same ring on both sides, float
+    const cv::Mat& gray;        // float, 0..1
+    const cv::Mat& bgr;         // blue, green, red, float, 0..1; empty: the picture is gray
+    const cv::Mat& around;      // gray of the same ring on both sides, float
     const cv::Mat& coordinate;  // the ring coordinate, float [pixels]
     WoodLevels levels;
-    double ring_width;      // [pixels]
+    double ring_width;  // [pixels]
 };
 
-/// 255 where the picture shows an even black or white that reaches in from one of its corners: what lies around a specimen on a scanner or a
-/// table. Where as much of the picture's inside is as plain, rings are drawn so. Known before anything about the wood is. `gray` and `bgr` as in
-/// a view; `black` is the brightest black, of the picture's brightest.
+/// 255 where the picture shows an even black or white that reaches in from one of its corners: what lies around a specimen on a
+/// scanner or a table. Where as much of the picture's inside is as plain, rings are drawn so. Known before anything about the
+/// wood is. `gray` and `bgr` as in a view; `black` is the brightest black, of the picture's brightest.
 cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black = 0.08);
 
 /// What in a picture is no plain wood, as a map of `Feature` numbers:

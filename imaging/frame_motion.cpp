@@ -22,15 +22,16 @@ double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(
 FrameMotion::FrameMotion(const Record& record, int frame, const std::filesystem::path& file) {
     const auto frames = static_cast<int>(record.frames.size());
     if (frame < 0 || frame >= frames || record.point_position.empty())
-        throw InputError(file.string(), "frames", fmt::format("{} of {}", frame, frames), "there is no such frame: give output.frames in the scene");
+        throw InputError(file.string(), "frames", fmt::format("{} of {}", frame, frames),
+                         "there is no such frame: give output.frames in the scene");
     if (!(record.point_size.minCoeff() > 0))
-        throw InputError(file.string(), "points", "no size", "the record is older than the size of its points: simulate it again");
+        throw InputError(file.string(), "points", "no size",
+                         "the record is older than the size of its points: simulate it again");
     places_ = record.point_position;
     moved_ = record.frames[static_cast<std::size_t>(frame)].moved;
     size_ = record.point_size;
     Vec2 highest = Vec2::Zero();
-    for (const Vec2& place : places_)
-        highest = highest.cwiseMax(place);
+    for (const Vec2& place : places_) highest = highest.cwiseMax(place);
     bins_ = (highest.cwiseQuotient(size_)).array().floor().cast<int>() + 1;
     points_.resize(static_cast<std::size_t>(bins_.prod()));
     crossed_.resize(points_.size());
@@ -43,8 +44,7 @@ FrameMotion::FrameMotion(const Record& record, int frame, const std::filesystem:
         for (std::size_t k = 0; k + 1 < line.size(); ++k) {
             const Eigen::Vector2i low = bin_of(line[k].cwiseMin(line[k + 1])), high = bin_of(line[k].cwiseMax(line[k + 1]));
             for (int j = low.y(); j <= high.y(); ++j)
-                for (int i = low.x(); i <= high.x(); ++i)
-                    crossed_[index({i, j})].push_back(static_cast<int>(segments_.size()));
+                for (int i = low.x(); i <= high.x(); ++i) crossed_[index({i, j})].push_back(static_cast<int>(segments_.size()));
             segments_.push_back({line[k], line[k + 1]});
         }
     }
@@ -91,8 +91,7 @@ Vec2 FrameMotion::operator()(const Vec2& place) const {
                     const Vec2& x = places_[static_cast<std::size_t>(p)];
                     const Vec2 offset = (x - inside).cwiseQuotient(size_);
                     const double share = offset.squaredNorm() / (reach * reach);
-                    if (share >= 1 || (!segments.empty() && parted(inside, x, segments)))
-                        continue;
+                    if (share >= 1 || (!segments.empty() && parted(inside, x, segments))) continue;
                     const double weight = (1 - share) * (1 - share);
                     const Eigen::Vector3d term(1, offset.x(), offset.y());
                     normal += weight * term * term.transpose();
@@ -100,8 +99,7 @@ Vec2 FrameMotion::operator()(const Vec2& place) const {
                     ++count;
                 }
         const Eigen::LDLT<Eigen::Matrix3d> factor(normal);
-        if (count < least_points || !(factor.vectorD().minCoeff() > 1e-6 * factor.vectorD().maxCoeff()))
-            continue;
+        if (count < least_points || !(factor.vectorD().minCoeff() > 1e-6 * factor.vectorD().maxCoeff())) continue;
         const Vec2 beyond = (place - inside).cwiseQuotient(size_);
         return factor.solve(right).transpose() * Eigen::Vector3d(1, beyond.x(), beyond.y());
     }

@@ -6,13 +6,13 @@
 
 namespace crampfit {
 
-/// The displacement of the material between the points of a record's frame. Linear about each place, by weighted least squares over the
-/// points within some two spacings (moving least squares; Lancaster and Salkauskas 1981) that no crack parts from it, so that it jumps
-/// across cracks and nowhere else.
+/// The displacement of the material between the points of a record's frame. Linear about each place, by weighted least squares
+/// over the points within some two spacings (moving least squares; Lancaster and Salkauskas 1981) that no crack parts from it, so
+/// that it jumps across cracks and nowhere else.
 class FrameMotion {
   public:
-    /// `frame` counts from 0. The cracks that the frame does not hold are taken as they are at the end of the record. Throws InputError,
-    /// naming `file`, for a record without such a frame, or without the size of its points.
+    /// `frame` counts from 0. The cracks that the frame does not hold are taken as they are at the end of the record. Throws
+    /// InputError, naming `file`, for a record without such a frame, or without the size of its points.
     FrameMotion(const Record& record, int frame, const std::filesystem::path& file);
 
     /// At a place of the undeformed specimen [m]; beyond its sides as the nearest points go on.

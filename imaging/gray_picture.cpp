@@ -43,8 +43,7 @@ class QuietBoundedDecoding {
   public:
     QuietBoundedDecoding()
         : alone_(mutex()), allocator_(cv::Mat::getDefaultAllocator()),
-          level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)),
-          errors_(std::cerr.rdbuf(nullptr)) {
+          level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)), errors_(std::cerr.rdbuf(nullptr)) {
         static BoundedAllocator bounded;
         cv::Mat::setDefaultAllocator(&bounded);
     }
@@ -115,9 +114,7 @@ cv::Mat to_gray(const cv::Mat& picture, int depth) {
 }  // namespace
 
 cv::Mat read_pixels(const std::filesystem::path& file, const PictureKey& asked_by) {
-    const auto fail = [&](const std::string& rule) {
-        throw InputError(asked_by.file, asked_by.key, file.string(), rule);
-    };
+    const auto fail = [&](const std::string& rule) { throw InputError(asked_by.file, asked_by.key, file.string(), rule); };
     const std::vector<std::uint8_t> bytes = read_bytes(file, asked_by);
     if (is_cut_short(bytes)) {
         fail("the picture is cut short");

@@ -49,10 +49,8 @@ std::vector<cv::Point2d> even(const std::vector<cv::Point2d>& line) {
 /// How far it is from a place to the picture's border in a direction [px].
 double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
     double length = std::numeric_limits<double>::infinity();
-    if (d.x != 0)
-        length = std::min(length, ((d.x > 0 ? size.width - 0.5 : -0.5) - from.x) / d.x);
-    if (d.y != 0)
-        length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
+    if (d.x != 0) length = std::min(length, ((d.x > 0 ? size.width - 0.5 : -0.5) - from.x) / d.x);
+    if (d.y != 0) length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
     return std::max(length, 0.0);
 }
 
@@ -60,8 +58,7 @@ double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
 double to_edge(const cv::Point2d& from, const cv::Point2d& d, const cv::Mat& specimen) {
     const double border = to_border(from, d, specimen.size());
     for (double length = 0; length < border - 0.5; ++length)
-        if (specimen.at<std::uint8_t>(cv::Point(from + length * d)) == 0)
-            return length;
+        if (specimen.at<std::uint8_t>(cv::Point(from + length * d)) == 0) return length;
     return border;
 }
 
@@ -70,7 +67,8 @@ cv::Mat strip_along(const cv::Mat& picture, const std::vector<cv::Point2d>& line
     const int count = static_cast<int>(line.size());
     cv::Mat places(count, 2 * reach + 1, CV_32FC2), strip;
     for (int i = 0; i < count; ++i) {
-        const cv::Point2d along = line[static_cast<std::size_t>(std::min(i + 5, count - 1))] - line[static_cast<std::size_t>(std::max(i - 5, 0))];
+        const cv::Point2d along =
+            line[static_cast<std::size_t>(std::min(i + 5, count - 1))] - line[static_cast<std::size_t>(std::max(i - 5, 0))];
         const cv::Point2d across = cv::Point2d(-along.y, along.x) / std::max(cv::norm(along), 1e-9);
         for (int j = -reach; j <= reach; ++j)
             places.at<cv::Point2f>(i, j + reach) = line[static_cast<std::size_t>(i)] + j * across;
@@ -79,15 +77,16 @@ cv::Mat strip_along(const cv::Mat& picture, const std::vector<cv::Point2d>& line
     return strip;
 }
 
-/// A crack that opens within a strip pushes wood out at its sides: the light that is missing, over that of the wood at the sides, is the
-/// opening, whatever the strip shows in between.
+/// A crack that opens within a strip pushes wood out at its sides: the light that is missing, over that of the wood at the sides,
+/// is the opening, whatever the strip shows in between.
 OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, const std::vector<cv::Point2d>& line, int reach) {
     const cv::Mat before = strip_along(reference, line, reach), now = strip_along(seen, line, reach);
     const int count = before.rows, last = before.cols - 1;
     const auto sum = [](const cv::Mat& strip, int row) { return cv::sum(strip.row(row))[0]; };
     OpeningProfile profile;
     for (int i = 0; i < count; ++i) {
-        const double left = cv::mean(before(cv::Rect(0, i, side, 1)))[0], right = cv::mean(before(cv::Rect(last + 1 - side, i, side, 1)))[0];
+        const double left = cv::mean(before(cv::Rect(0, i, side, 1)))[0],
+                     right = cv::mean(before(cv::Rect(last + 1 - side, i, side, 1)))[0];
         const double wood = std::max(0.5 * (left + right), 1.0);
         profile.opening.push_back((sum(before, i) - sum(now, i)) / wood);
         profile.along.push_back((sum(before, std::min(i + 1, count - 1)) - sum(before, std::max(i - 1, 0))) / (2 * wood));
@@ -98,7 +97,7 @@ OpeningProfile opening_along(const cv::Mat& reference, const cv::Mat& seen, cons
 
 struct Tip {
     cv::Point2d place, direction;
-    double along, sigma;  // from the line's first point [px]
+    double along, sigma;            // from the line's first point [px]
     std::vector<cv::Point2d> last;  // stretch of the line, up to the tip
 };
 
@@ -109,13 +108,12 @@ std::optional<Tip> tip_along(const cv::Mat& reference, const cv::Mat& seen, cons
     std::vector<cv::Point2d> line(known.begin() + static_cast<std::ptrdiff_t>(from), known.end());
     const cv::Point2d d = direction_at(known, true, heading);
     const int room = std::min(ahead, static_cast<int>(to_border(known.back(), d, reference.size())));
-    for (int i = 1; i <= room; ++i)
-        line.push_back(known.back() + i * d);
+    for (int i = 1; i <= room; ++i) line.push_back(known.back() + i * d);
     const std::size_t tail = way.half_width.size() > behind ? way.half_width.size() - behind : 0;
     const double widest = *std::max_element(way.half_width.begin() + static_cast<std::ptrdiff_t>(tail), way.half_width.end());
-    const std::optional<OpeningStart> start = find_opening_start(opening_along(reference, seen, line, static_cast<int>(std::ceil(widest + slack))));
-    if (!start)
-        return std::nullopt;
+    const std::optional<OpeningStart> start =
+        find_opening_start(opening_along(reference, seen, line, static_cast<int>(std::ceil(widest + slack))));
+    if (!start) return std::nullopt;
     const auto i = static_cast<std::size_t>(start->place);
     const double part = start->place - static_cast<double>(i);
     const cv::Point2d place = line[i] + part * (line[std::min(i + 1, line.size() - 1)] - line[i]);
@@ -129,21 +127,20 @@ cv::Mat around(const cv::Point2d& tip, cv::Size size) {
     cv::Mat weight(size, CV_32F);
     for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x)
-            weight.at<float>(y, x) = static_cast<float>(std::exp(-0.5 * (std::pow(x - tip.x, 2) + std::pow(y - tip.y, 2)) / (about * about)));
+            weight.at<float>(y, x) =
+                static_cast<float>(std::exp(-0.5 * (std::pow(x - tip.x, 2) + std::pow(y - tip.y, 2)) / (about * about)));
     return weight;
 }
 
 /// A line that was found in one alignment, in another.
 DarkWay moved(DarkWay way, const Alignment& from, const Alignment& to) {
-    for (cv::Point2d& point : way.points)
-        point = to.to_reference(from.to_image(point));
+    for (cv::Point2d& point : way.points) point = to.to_reference(from.to_image(point));
     return way;
 }
 
 std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
     std::vector<Vec2> result;
-    for (const cv::Point2d& point : points)
-        result.emplace_back(point.x, point.y);
+    for (const cv::Point2d& point : points) result.emplace_back(point.x, point.y);
     return result;
 }
 
@@ -162,7 +159,8 @@ GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::ui
     double brightest = 0;
     cv::minMaxLoc(state->reference, nullptr, &brightest);
     // Bright wood without any pattern is as even as a bright ground.
-    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}, ground) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
+    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}, ground) == 0) |
+                      (state->reference > 0.5 * cv::mean(state->reference)[0]);
     state->allowed = state->specimen.clone();
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
@@ -186,9 +184,9 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
         return found;
     }
     const cv::Mat seen = seen_as_reference(image, whole, size);
-    const std::optional<DarkWay> way = find_dark_way(reference, seen, shown_of_reference(image.size(), whole, size) & state_->allowed);
-    if (!way)
-        return found;
+    const std::optional<DarkWay> way =
+        find_dark_way(reference, seen, shown_of_reference(image.size(), whole, size) & state_->allowed);
+    if (!way) return found;
     if (!way->ends_inside) {
         found.status = TipStatus::outside;
         found.way = vectors(closed_way(reference, image, weight, whole, *way));
@@ -197,8 +195,7 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     // The wood about the tip moves by itself: once more, lined up there.
     const Alignment about_tip = line_up(reference, image, weight.mul(around(way->points.back(), size)), whole, likely_about_tip);
     const std::optional<Tip> tip = tip_along(reference, seen_as_reference(image, about_tip, size), moved(*way, whole, about_tip));
-    if (!tip)
-        return found;
+    if (!tip) return found;
     found.status = TipStatus::ok;
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);

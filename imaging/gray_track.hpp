@@ -8,9 +8,10 @@
 
 namespace crampfit {
 
-/// The tip of a crack that opens as a dark line, in plain pictures without a pattern to correlate. Each image is lined up with the reference,
-/// which shows no crack or a shorter one; what has darkened is followed from its mouth; along it the share of the light that is missing
-/// across the line measures the opening, down to small parts of a pixel, and the tip is where that opening begins.
+/// The tip of a crack that opens as a dark line, in plain pictures without a pattern to correlate. Each image is lined up with
+/// the reference, which shows no crack or a shorter one; what has darkened is followed from its mouth; along it the share of the
+/// light that is missing across the line measures the opening, down to small parts of a pixel, and the tip is where that opening
+/// begins.
 class GrayTracker {
   public:
     /// `mask` is empty or, a pixel of the reference each, 0 where nothing is to be looked for.

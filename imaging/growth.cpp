@@ -45,8 +45,7 @@ double spread(const OrientationField& field, const GrowthFrame& frame) {
         mean_u += w * u;
         mean_angle += w * angle;
     });
-    if (!(weight > 0))
-        return 0;
+    if (!(weight > 0)) return 0;
     mean_u /= weight;
     mean_angle /= weight;
     for_all([&](double w, double u, double angle) {

@@ -41,14 +41,12 @@ class GrowthFrame {
 
     cv::Mat transpose(const cv::Mat& pixels) const {
         cv::Mat turned;
-        if (across())
-            cv::transpose(pixels, turned);
+        if (across()) cv::transpose(pixels, turned);
         return across() ? turned : pixels;
     }
     cv::Mat flip(const cv::Mat& pixels) const {
         cv::Mat turned;
-        if (backward())
-            cv::flip(pixels, turned, 0);
+        if (backward()) cv::flip(pixels, turned, 0);
         return backward() ? turned : pixels;
     }
 

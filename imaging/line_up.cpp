@@ -11,27 +11,27 @@ namespace crampfit {
 namespace {
 
 constexpr int motions = 6, parameters = motions + 4;
-constexpr double coarsest_side = 40;      // shorter side of the coarsest copies [px]
-constexpr double most_pixels = 1 << 20;   // of the finest copies: more says no more
+constexpr double coarsest_side = 40;     // shorter side of the coarsest copies [px]
+constexpr double most_pixels = 1 << 20;  // of the finest copies: more says no more
 constexpr int most_iterations = 30;
-constexpr double settled = 1e-3;          // [px]
-constexpr double least_seen = 2;           // of a motion, in what noise would say of it
-constexpr double tukey = 4.685;           // 95 % efficient for Gaussian noise (Holland and Welsch 1977)
+constexpr double settled = 1e-3;  // [px]
+constexpr double least_seen = 2;  // of a motion, in what noise would say of it
+constexpr double tukey = 4.685;   // 95 % efficient for Gaussian noise (Holland and Welsch 1977)
 
 using Row = Eigen::Matrix<double, parameters, 1>;
 using Normal = Eigen::Matrix<double, parameters, parameters>;
 
 /// Coordinates that run from -1 to 1 over the picture, so that the parameters are of like size.
 struct Unit {
-    explicit Unit(cv::Size size) : middle((size.width - 1) / 2.0, (size.height - 1) / 2.0), half(size.width / 2.0, size.height / 2.0) {}
+    explicit Unit(cv::Size size)
+        : middle((size.width - 1) / 2.0, (size.height - 1) / 2.0), half(size.width / 2.0, size.height / 2.0) {}
     double x(double column) const { return (column - middle.x) / half.x; }
     double y(double row) const { return (row - middle.y) / half.y; }
     cv::Point2d middle, half;
 };
 
 double median(std::vector<float>& values) {
-    if (values.empty())
-        return 0;
+    if (values.empty()) return 0;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::ranges::nth_element(values, middle);
     return *middle;
@@ -79,8 +79,7 @@ Level level_at(const cv::Mat& reference, const cv::Mat& image, const cv::Mat& we
     };
     copy(reference, level.reference);
     copy(image, level.image);
-    if (!weight.empty())
-        cv::resize(weight, level.weight, level.reference.size(), 0, 0, cv::INTER_AREA);
+    if (!weight.empty()) cv::resize(weight, level.weight, level.reference.size(), 0, 0, cv::INTER_AREA);
     cv::Scharr(level.image, level.by_x, CV_32F, 1, 0, 1.0 / 32);
     cv::Scharr(level.image, level.by_y, CV_32F, 0, 1, 1.0 / 32);
     return level;
@@ -104,7 +103,8 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
     const Unit unit(size);
     const auto warped = [&](const cv::Mat& of) {
         cv::Mat out;
-        cv::warpAffine(of, out, now.map, size, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_CONSTANT, cv::Scalar::all(NAN));
+        cv::warpAffine(of, out, now.map, size, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_CONSTANT,
+                       cv::Scalar::all(NAN));
         return out;
     };
     const cv::Mat image = warped(level.image), by_x = warped(level.by_x), by_y = warped(level.by_y);
@@ -112,7 +112,8 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
     std::vector<float> sizes;
     for (int y = 0; y < size.height; y += every)
         for (int x = 0; x < size.width; x += every)
-            if (const float seen = image.at<float>(y, x); !std::isnan(seen) && (level.weight.empty() || level.weight.at<float>(y, x) > 0.5f))
+            if (const float seen = image.at<float>(y, x);
+                !std::isnan(seen) && (level.weight.empty() || level.weight.at<float>(y, x) > 0.5f))
                 sizes.push_back(std::abs(seen - static_cast<float>(modelled(now, unit, x, y, level.reference.at<float>(y, x)))));
     now.residual = std::max(1.4826 * median(sizes), 0.1);  // of the rounding to whole grays, at least
 
@@ -122,12 +123,11 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
     for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x) {
             const double gx = by_x.at<float>(y, x), gy = by_y.at<float>(y, x);
-            if (std::isnan(gx + gy))
-                continue;
-            const double reference = level.reference.at<float>(y, x), left = image.at<float>(y, x) - modelled(now, unit, x, y, reference);
+            if (std::isnan(gx + gy)) continue;
+            const double reference = level.reference.at<float>(y, x),
+                         left = image.at<float>(y, x) - modelled(now, unit, x, y, reference);
             const double share = left / (tukey * now.residual);
-            if (std::abs(share) >= 1)
-                continue;
+            if (std::abs(share) >= 1) continue;
             const double weight = std::pow(1 - share * share, 2) * (level.weight.empty() ? 1.0 : level.weight.at<float>(y, x));
             const double a = unit.x(x), b = unit.y(y);
             Row row;
@@ -152,15 +152,13 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
         normal(i, i) += hold;
         right[i] -= moves ? hold * away[i] : 0;
     }
-    for (int i = motions; i < parameters; ++i)
-        normal(i, i) *= 1 + 1e-9;
-    normal(parameters - 1, parameters - 1) += 1e-6 * normal(motions, motions);  // gain and offset are one in a picture of one gray
+    for (int i = motions; i < parameters; ++i) normal(i, i) *= 1 + 1e-9;
+    normal(parameters - 1, parameters - 1) +=
+        1e-6 * normal(motions, motions);  // gain and offset are one in a picture of one gray
     const Row step = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
-    if (!step.allFinite())
-        return 0;
+    if (!step.allFinite()) return 0;
     move(now.map, step, unit);
-    for (int i = 0; i < 4; ++i)
-        now.light[i] += step[motions + i];
+    for (int i = 0; i < 4; ++i) now.light[i] += step[motions + i];
     return step.head<motions>().cwiseAbs().maxCoeff();
 }
 
@@ -168,8 +166,7 @@ double improve(const Level& level, Alignment& now, const cv::Matx23d& start, dou
 void take_back_unseen(Alignment& now, const cv::Matx23d& start, const Evidence& evidence, const Unit& unit) {
     const Information noise = evidence.by_noise + 1e-9 * evidence.by_noise.trace() * Information::Identity();
     const Eigen::GeneralizedSelfAdjointEigenSolver<Information> parts(evidence.found, noise);
-    if (parts.info() != Eigen::Success)
-        return;
+    if (parts.info() != Eigen::Success) return;
     const Motion away = between(start, now.map, unit).head<motions>();
     Row back = Row::Zero();
     for (int i = 0; i < motions; ++i)
@@ -197,8 +194,7 @@ Alignment line_up(const cv::Mat& reference, const cv::Mat& image, const cv::Mat&
     const double finest = std::min(1.0, std::sqrt(most_pixels / static_cast<double>(reference.total())));
     Alignment now = start;
     double scale = finest;
-    while (scale * side > 2 * coarsest_side)
-        scale *= 0.5;
+    while (scale * side > 2 * coarsest_side) scale *= 0.5;
     for (;; scale = std::min(2 * scale, finest)) {
         const Level level = level_at(reference, image, weight, scale);
         now.map = scaled(now.map, scale);
@@ -207,11 +203,9 @@ Alignment line_up(const cv::Mat& reference, const cv::Mat& image, const cv::Mat&
         for (int i = 0; i < most_iterations && improve(level, now, held, scale * likely, true, evidence) > settled; ++i) {
         }
         take_back_unseen(now, held, evidence, Unit(level.reference.size()));
-        for (int i = 0; i < 3; ++i)
-            improve(level, now, held, scale * likely, false, evidence);
+        for (int i = 0; i < 3; ++i) improve(level, now, held, scale * likely, false, evidence);
         now.map = scaled(now.map, 1 / scale);
-        if (scale >= finest)
-            return now;
+        if (scale >= finest) return now;
     }
 }
 

@@ -23,8 +23,7 @@ void write_borders(const EndGrain& grown, const std::filesystem::path& file) {
     for (const RingBorder& border : grown.borders) {
         for (const Vec2& point : border.points) {
             const Vec2 pixels = point / grown.truth.pixel;
-            std::snprintf(line, sizeof line, "%d,%.3f,%.3f\n", border.ring, pixels.x() - 0.5,
-                          grown.rows - pixels.y() - 0.5);
+            std::snprintf(line, sizeof line, "%d,%.3f,%.3f\n", border.ring, pixels.x() - 0.5, grown.rows - pixels.y() - 0.5);
             out << line;
         }
     }
@@ -35,8 +34,7 @@ void write_borders(const EndGrain& grown, const std::filesystem::path& file) {
 
 void write_picture(const EndGrain& grown, bool colour, const std::filesystem::path& file) {
     if (!cv::haveImageWriter(file.string())) {
-        throw InputError("command line", "--picture", file.string(),
-                         "must end as a picture does, such as .png or .bmp");
+        throw InputError("command line", "--picture", file.string(), "must end as a picture does, such as .png or .bmp");
     }
     const cv::Mat pixels(grown.rows, grown.columns, colour ? CV_8UC3 : CV_8UC1,
                          const_cast<std::uint8_t*>(colour ? grown.bgr.data() : grown.gray.data()));
@@ -49,8 +47,8 @@ void write_picture(const EndGrain& grown, bool colour, const std::filesystem::pa
 CLI::Option* length(CLI::App& app, const std::string& name, double& value, const std::string& help) {
     static const std::map<std::string, double> units{{"m", 1.0}, {"mm", 1e-3}, {"um", 1e-6}};
     return app.add_option(name, value, help)
-        ->transform(CLI::AsNumberWithUnit(units, CLI::AsNumberWithUnit::Options(CLI::AsNumberWithUnit::CASE_SENSITIVE |
-                                                                                CLI::AsNumberWithUnit::UNIT_REQUIRED)));
+        ->transform(CLI::AsNumberWithUnit(
+            units, CLI::AsNumberWithUnit::Options(CLI::AsNumberWithUnit::CASE_SENSITIVE | CLI::AsNumberWithUnit::UNIT_REQUIRED)));
 }
 
 }  // namespace

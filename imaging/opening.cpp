@@ -9,8 +9,8 @@
 namespace crampfit {
 namespace {
 
-constexpr double blur = 1.5;          // of the opening along the crack: lens, pixels and interpolation [px]
-constexpr int places_a_pixel = 4;     // that are looked at
+constexpr double blur = 1.5;       // of the opening along the crack: lens, pixels and interpolation [px]
+constexpr int places_a_pixel = 4;  // that are looked at
 constexpr double power_step = 0.25, highest_power = 1.5;
 constexpr int least_points = 8;       // on either side of the tip
 constexpr double least_freedom = 10;  // neighbours go along where the model misses something, too
@@ -93,7 +93,8 @@ std::vector<Fitted> fit_all(Rows rows, const Eigen::VectorXd& opening, const Eig
         for (int place = least_points * places_a_pixel; place <= (count - 1 - least_points) * places_a_pixel; ++place) {
             for (int i = 0; i < count; ++i)
                 rows.row(i).head<opening_terms>() << first.at(place - i * places_a_pixel), second.at(place - i * places_a_pixel);
-            Fitted& fitted = all.emplace_back(Fitted{static_cast<double>(place) / places_a_pixel, 0, residuals(rows, opening, weights)});
+            Fitted& fitted =
+                all.emplace_back(Fitted{static_cast<double>(place) / places_a_pixel, 0, residuals(rows, opening, weights)});
             fitted.squares = fitted.left.cwiseAbs2().dot(weights);
         }
     }
@@ -104,8 +105,7 @@ std::vector<Fitted> fit_all(Rows rows, const Eigen::VectorXd& opening, const Eig
 
 std::optional<OpeningStart> find_opening_start(const OpeningProfile& profile) {
     const int count = static_cast<int>(profile.opening.size());
-    if (count < 2 * least_points + 1)
-        return std::nullopt;
+    if (count < 2 * least_points + 1) return std::nullopt;
     const Eigen::VectorXd opening = Eigen::Map<const Eigen::VectorXd>(profile.opening.data(), count);
     const Rows rows = other_rows(profile);
     Eigen::VectorXd weights = Eigen::VectorXd::Ones(count);
@@ -116,9 +116,9 @@ std::optional<OpeningStart> find_opening_start(const OpeningProfile& profile) {
     }
     const Fitted& best = *std::ranges::min_element(all, {}, &Fitted::squares);
     const double none = residuals(rows, opening, weights).cwiseAbs2().dot(weights);
-    const double freedom = std::max(independent(weights.cwiseSqrt().cwiseProduct(best.left)) - static_cast<double>(rows.cols()) - 2, least_freedom);
-    if (!((none - best.squares) / 4 > least_gain * best.squares / freedom))
-        return std::nullopt;
+    const double freedom =
+        std::max(independent(weights.cwiseSqrt().cwiseProduct(best.left)) - static_cast<double>(rows.cols()) - 2, least_freedom);
+    if (!((none - best.squares) / 4 > least_gain * best.squares / freedom)) return std::nullopt;
     double mass = 0, mean = 0, square = 0;
     for (const Fitted& one : all) {
         const double weight = std::exp(-0.5 * freedom * (one.squares / best.squares - 1));

@@ -35,8 +35,7 @@ Tensor gradients(const cv::Mat& gray, const cv::Mat& valid, double sigma) {
     const double strong = 4 * cv::mean(tensor.energy, trusted)[0];
     cv::Mat weight = 1.0 / (tensor.energy + std::max(strong, 1e-30));
     weight.setTo(0, trusted == 0);
-    for (cv::Mat* part : {&tensor.energy, &tensor.cos2, &tensor.sin2})
-        *part = part->mul(weight);
+    for (cv::Mat* part : {&tensor.energy, &tensor.cos2, &tensor.sin2}) *part = part->mul(weight);
     return tensor;
 }
 
@@ -69,7 +68,8 @@ class Moments {
         for (int order = 0; order < 3; ++order) {
             all[order].create(1, 2 * half + 1, CV_32F);
             for (int i = -half; i <= half; ++i)
-                all[order].at<float>(i + half) = static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) * std::pow(i / sigma, order));
+                all[order].at<float>(i + half) =
+                    static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) * std::pow(i / sigma, order));
         }
         return all;
     }
@@ -97,22 +97,19 @@ OrientationField fit(const Tensor& tensor, cv::Size2d window) {
     OrientationField field;
     const int step = step_for(window);
     field.step = step;
-    const cv::Mat energy = reduced(tensor.energy, step), c = reduced(tensor.cos2, step),
-                  s = reduced(tensor.sin2, step);
+    const cv::Mat energy = reduced(tensor.energy, step), c = reduced(tensor.cos2, step), s = reduced(tensor.sin2, step);
     const Moments moments(window * (1.0 / step));
     const cv::Mat m00 = moments(energy, 0, 0), m10 = moments(energy, 1, 0), m01 = moments(energy, 0, 1),
                   m20 = moments(energy, 2, 0), m11 = moments(energy, 1, 1), m02 = moments(energy, 0, 2);
     const cv::Mat c0 = moments(c, 0, 0), c1 = moments(c, 1, 0), c2 = moments(c, 0, 1);
     const cv::Mat s0 = moments(s, 0, 0), s1 = moments(s, 1, 0), s2 = moments(s, 0, 1);
-    for (cv::Mat* map : {&field.cos2, &field.sin2})
-        *map = cv::Mat::zeros(energy.size(), CV_32F);
+    for (cv::Mat* map : {&field.cos2, &field.sin2}) *map = cv::Mat::zeros(energy.size(), CV_32F);
     field.coherency = coherency_of(tensor, window);
     for (int j = 0; j < energy.rows; ++j) {
         for (int i = 0; i < energy.cols; ++i) {
             const auto at = [i, j](const cv::Mat& map) { return static_cast<double>(map.at<float>(j, i)); };
             const double mass = at(m00);
-            if (!(mass > 1e-12))
-                continue;
+            if (!(mass > 1e-12)) continue;
             // A slope that the window hardly sees stays small: a hundredth of the mass stands against it.
             const double ridge = 0.01 * mass;
             Eigen::Matrix3d normal;
@@ -121,8 +118,7 @@ OrientationField fit(const Tensor& tensor, cv::Size2d window) {
             right << at(c0), at(s0), at(c1), at(s1), at(c2), at(s2);
             const Eigen::RowVector2d vector = normal.ldlt().solve(right).row(0);
             const double length = vector.norm();
-            if (!(length > 1e-9))
-                continue;
+            if (!(length > 1e-9)) continue;
             field.cos2.at<float>(j, i) = static_cast<float>(vector.x() / length);
             field.sin2.at<float>(j, i) = static_cast<float>(vector.y() / length);
         }
@@ -136,8 +132,7 @@ void fill_in(OrientationField& field, cv::Size2d window) {
     const cv::Size2d sigma = window * (2 / field.step);
     cv::GaussianBlur(field.cos2.mul(field.coherency), sum_c, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
     cv::GaussianBlur(field.sin2.mul(field.coherency), sum_s, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
-    const double all_c = cv::sum(field.cos2.mul(field.coherency))[0],
-                 all_s = cv::sum(field.sin2.mul(field.coherency))[0];
+    const double all_c = cv::sum(field.cos2.mul(field.coherency))[0], all_s = cv::sum(field.sin2.mul(field.coherency))[0];
     const double all = std::hypot(all_c, all_s);
     for (int j = 0; j < sum_c.rows; ++j) {
         for (int i = 0; i < sum_c.cols; ++i) {
@@ -165,8 +160,7 @@ void trust_agreeing(Tensor& tensor, const OrientationField& before) {
     cv::max(tensor.energy, 1e-30, length);
     cv::Mat trust = 0.5 + 0.5 * (tensor.cos2.mul(c) + tensor.sin2.mul(s)) / length;
     trust = trust.mul(trust);
-    for (cv::Mat* part : {&tensor.energy, &tensor.cos2, &tensor.sin2})
-        *part = part->mul(trust);
+    for (cv::Mat* part : {&tensor.energy, &tensor.cos2, &tensor.sin2}) *part = part->mul(trust);
 }
 
 }  // namespace
@@ -194,21 +188,16 @@ OrientationField measure_orientation(const cv::Mat& gray, const cv::Mat& valid, 
 bool holds_pith(const OrientationField& field) {
     const int right = field.cos2.cols - 1, bottom = field.cos2.rows - 1;
     std::vector<cv::Point> round;  // the lattice's outermost nodes, once around
-    for (int i = 0; i < right; ++i)
-        round.emplace_back(i, 0);
-    for (int j = 0; j < bottom; ++j)
-        round.emplace_back(right, j);
-    for (int i = right; i > 0; --i)
-        round.emplace_back(i, bottom);
-    for (int j = bottom; j > 0; --j)
-        round.emplace_back(0, j);
+    for (int i = 0; i < right; ++i) round.emplace_back(i, 0);
+    for (int j = 0; j < bottom; ++j) round.emplace_back(right, j);
+    for (int i = right; i > 0; --i) round.emplace_back(i, bottom);
+    for (int j = bottom; j > 0; --j) round.emplace_back(0, j);
     const auto angle = [&](std::size_t k) {
         const cv::Point at = round[k % round.size()];
         return std::atan2(field.sin2.at<float>(at), field.cos2.at<float>(at));
     };
     double turned = 0;
-    for (std::size_t k = 0; k < round.size(); ++k)
-        turned += std::remainder(angle(k + 1) - angle(k), 2 * std::numbers::pi);
+    for (std::size_t k = 0; k < round.size(); ++k) turned += std::remainder(angle(k + 1) - angle(k), 2 * std::numbers::pi);
     return std::lround(std::abs(turned) / (2 * std::numbers::pi)) == 2;
 }
 

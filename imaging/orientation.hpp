@@ -16,8 +16,8 @@ struct OrientationField {
 };
 
 struct OrientationScale {
-    double derivative = 2;           // standard deviation of the Gaussian under the derivative [pixels]
-    cv::Size2d window = {20, 20};    // of the window over which gradients are gathered, along x and y [pixels]
+    double derivative = 2;         // standard deviation of the Gaussian under the derivative [pixels]
+    cv::Size2d window = {20, 20};  // of the window over which gradients are gathered, along x and y [pixels]
 };
 
 /// Structure tensor (Bigun & Granlund 1987) with Scharr's derivative filters (Scharr 2000), fitted to first order: the

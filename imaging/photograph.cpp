@@ -28,13 +28,14 @@ cv::Matx23d to_photograph(const PlanePicture& kept, double kept_pixel, const Pla
 }  // namespace
 
 void load_photograph(Photograph& photograph, const Vec2& size, const PictureKey& asked_by) {
-    if (photograph.file.empty())
-        return;
+    if (photograph.file.empty()) return;
     GrayPicture whole = read_gray(photograph.file, asked_by);
-    const auto refuse = [&](const std::string& rule) { throw InputError(asked_by.file, asked_by.key, photograph.file.string(), rule); };
+    const auto refuse = [&](const std::string& rule) {
+        throw InputError(asked_by.file, asked_by.key, photograph.file.string(), rule);
+    };
     if (photograph.rows > 0 && (whole.columns != photograph.columns || whole.rows != photograph.rows))
-        refuse(fmt::format("is {} x {} pixels, those that the crack was tracked in {} x {}: must have their size", whole.columns, whole.rows,
-                           photograph.columns, photograph.rows));
+        refuse(fmt::format("is {} x {} pixels, those that the crack was tracked in {} x {}: must have their size", whole.columns,
+                           whole.rows, photograph.columns, photograph.rows));
     Placement& placement = photograph.placement;
     placement.rows = whole.rows;
 
@@ -49,7 +50,9 @@ void load_photograph(Photograph& photograph, const Vec2& size, const PictureKey&
 
     cv::Mat source(whole.rows, whole.columns, CV_8U, whole.gray.data());
     if (const double factor = placement.pixel / pixel; factor < 1)
-        cv::resize(source, source, {std::max(1, static_cast<int>(std::lround(factor * whole.columns))), std::max(1, static_cast<int>(std::lround(factor * whole.rows)))},
+        cv::resize(source, source,
+                   {std::max(1, static_cast<int>(std::lround(factor * whole.columns))),
+                    std::max(1, static_cast<int>(std::lround(factor * whole.rows)))},
                    0, 0, cv::INTER_AREA);
     const Vec2 shrunk(static_cast<double>(whole.columns) / source.cols, static_cast<double>(whole.rows) / source.rows);
     const cv::Matx23d map = to_photograph(kept, pixel, placement, shrunk);
@@ -58,13 +61,13 @@ void load_photograph(Photograph& photograph, const Vec2& size, const PictureKey&
     cv::warpAffine(source, turned, map, {kept.columns, kept.rows}, how, cv::BORDER_CONSTANT, cv::Scalar::all(255));
     cv::warpAffine(cv::Mat(source.size(), CV_8U, cv::Scalar(255)), shown, map, {kept.columns, kept.rows}, how);
     if (cv::countNonZero(shown) == 0)
-        refuse(fmt::format("shows nothing of the specimen, {:g} x {:g} mm: check pixel, offset and rotation", 1e3 * size.x(), 1e3 * size.y()));
+        refuse(fmt::format("shows nothing of the specimen, {:g} x {:g} mm: check pixel, offset and rotation", 1e3 * size.x(),
+                           1e3 * size.y()));
     kept.gray.assign(turned.datastart, turned.dataend);
 }
 
 void load_pictures(Study& study) {
-    if (study.scene)
-        load_specimen(*study.scene);
+    if (study.scene) load_specimen(*study.scene);
     for (Experiment& experiment : study.experiments) {
         load_specimen(experiment.scene);
         if (experiment.photograph)
@@ -72,8 +75,7 @@ void load_pictures(Study& study) {
                             {study.file.string(), "experiments." + experiment.name + ".photograph.picture"});
     }
     for (ModelChoice& model : study.models)
-        for (Scene& scene : model.scenes)
-            load_specimen(scene);
+        for (Scene& scene : model.scenes) load_specimen(scene);
 }
 
 }  // namespace crampfit

@@ -85,8 +85,8 @@ void require_covered(const GrayPicture& pixels, const Meanings& meanings, const 
     for (std::size_t i = 1; i < classes.size(); ++i) {
         ranges += ", " + text(classes[i]);
     }
-    std::string rule = "must cover every gray of " + picture.file.string() + ", but gray " + std::to_string(commonest) +
-                       " (" + std::to_string(count[commonest]) + " pixels) lies in no range";
+    std::string rule = "must cover every gray of " + picture.file.string() + ", but gray " + std::to_string(commonest) + " (" +
+                       std::to_string(count[commonest]) + " pixels) lies in no range";
     if (grays > 1) {
         rule += ", nor do " + std::to_string(grays - 1) + " other grays; " + std::to_string(all) + " pixels in all";
     }
@@ -97,12 +97,9 @@ std::vector<float> read_orientation(const Picture& picture, const GrayPicture& p
     const PictureKey key{asking_file, "specimen.orientation"};
     const GrayPicture angles = read_gray(picture.orientation, key);
     if (angles.columns != pixels.columns || angles.rows != pixels.rows) {
-        const auto size = [](const GrayPicture& p) {
-            return std::to_string(p.columns) + " x " + std::to_string(p.rows);
-        };
+        const auto size = [](const GrayPicture& p) { return std::to_string(p.columns) + " x " + std::to_string(p.rows); };
         throw InputError(key.file, key.key, picture.orientation.string(),
-                         "must be as large as the picture: it is " + size(angles) + " pixels, the picture " +
-                             size(pixels));
+                         "must be as large as the picture: it is " + size(angles) + " pixels, the picture " + size(pixels));
     }
     std::vector<float> orientation(angles.gray.size());
     std::transform(angles.gray.begin(), angles.gray.end(), orientation.begin(),
@@ -113,8 +110,7 @@ std::vector<float> read_orientation(const Picture& picture, const GrayPicture& p
 /// `asking_file` is what errors name as the place of the keys.
 Specimen read_picture(const Picture& picture, const std::string& asking_file) {
     if (!(std::isfinite(picture.pixel) && picture.pixel > 0)) {
-        throw InputError(asking_file, "specimen.pixel", std::to_string(picture.pixel) + " m",
-                         "must be a positive length");
+        throw InputError(asking_file, "specimen.pixel", std::to_string(picture.pixel) + " m", "must be a positive length");
     }
     const std::vector<GrayClass> classes = sorted_classes(picture, asking_file);
     const GrayPicture pixels = read_gray(picture.file, {asking_file, "specimen.image"});

@@ -33,8 +33,7 @@ std::vector<Ring> rings_of(const OrientationField& field) {
         for (int i = 0; i < field.cos2.cols; ++i) {
             const double angle = 0.5 * std::atan2(field.sin2.at<float>(j, i), field.cos2.at<float>(j, i));
             const double coherency = field.coherency.at<float>(j, i);
-            if (coherency > 0)
-                rings.push_back({node(field, i, j), {-std::sin(angle), std::cos(angle)}, coherency * coherency});
+            if (coherency > 0) rings.push_back({node(field, i, j), {-std::sin(angle), std::cos(angle)}, coherency * coherency});
         }
     return rings;
 }
@@ -42,8 +41,7 @@ std::vector<Ring> rings_of(const OrientationField& field) {
 }  // namespace
 
 std::optional<cv::Point2d> RadialFan::pith() const {
-    if (turn == 0)
-        return std::nullopt;
+    if (turn == 0) return std::nullopt;
     return middle - away / turn;
 }
 
@@ -55,8 +53,7 @@ RadialFan fan_from(const cv::Point2d& pith, cv::Size picture) {
 std::optional<RadialFan> fit_fan(const OrientationField& field, cv::Size picture) {
     constexpr int rounds = 30;  // each leaves some tenth of the change of the one before
     const std::vector<Ring> rings = rings_of(field);
-    if (rings.size() < 3)
-        return std::nullopt;
+    if (rings.size() < 3) return std::nullopt;
     const double length = 0.5 * std::hypot(picture.width, picture.height);
     RadialFan fan{middle_of(picture), {}, 0, 0};
     std::vector<double> weight(rings.size());
@@ -93,8 +90,7 @@ void turn_to_fan(OrientationField& field, const RadialFan& fan) {
         for (int i = 0; i < field.cos2.cols; ++i) {
             const cv::Point2d n = fan.direction(node(field, i, j));
             const double square = n.dot(n);
-            if (!(square > 0))
-                continue;  // the pith itself
+            if (!(square > 0)) continue;  // the pith itself
             field.cos2.at<float>(j, i) = static_cast<float>((n.x * n.x - n.y * n.y) / square);
             field.sin2.at<float>(j, i) = static_cast<float>(2 * n.x * n.y / square);
         }

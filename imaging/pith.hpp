@@ -9,10 +9,10 @@ namespace crampfit {
 /// Radial directions of rings about one pith: at a place p of the picture (x right, y down) the wood grew along
 /// away + turn (p - middle). Straight rings have a turn of 0 and their pith nowhere.
 struct RadialFan {
-    cv::Point2d middle;    // of the picture [pixels]
-    cv::Point2d away;      // radial direction there, any length
-    double turn = 0;       // [1/pixel]
-    double scatter = 0;    // standard deviation of the measured directions about these, by their median [rad]
+    cv::Point2d middle;  // of the picture [pixels]
+    cv::Point2d away;    // radial direction there, any length
+    double turn = 0;     // [1/pixel]
+    double scatter = 0;  // standard deviation of the measured directions about these, by their median [rad]
 
     cv::Point2d direction(const cv::Point2d& place) const { return away + turn * (place - middle); }
     /// None where rings are straight.

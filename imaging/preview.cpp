@@ -18,10 +18,8 @@ cv::Mat photograph(const std::filesystem::path& image) {
     cv::Mat pixels = read_pixels(image, {"command line", "IMAGE"});
     double brightest = 0;
     cv::minMaxLoc(pixels.reshape(1), nullptr, &brightest);
-    if (pixels.depth() == CV_16U)
-        pixels.convertTo(pixels, CV_8U, 255 / std::max(brightest, 1.0));
-    if (pixels.channels() == 1)
-        cv::cvtColor(pixels, pixels, cv::COLOR_GRAY2BGR);
+    if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 255 / std::max(brightest, 1.0));
+    if (pixels.channels() == 1) cv::cvtColor(pixels, pixels, cv::COLOR_GRAY2BGR);
     return pixels;
 }
 
@@ -32,8 +30,7 @@ void tint(cv::Mat& picture, const cv::Mat& mask, const cv::Scalar& colour) {
 }
 
 void draw_features(cv::Mat& picture, const Specimen& specimen) {
-    if (specimen.feature.empty())
-        return;
+    if (specimen.feature.empty()) return;
     const cv::Mat feature(specimen.rows, specimen.columns, CV_8U, const_cast<std::uint8_t*>(specimen.feature.data()));
     tint(picture, feature == static_cast<double>(Feature::background), {255, 128, 0});
     tint(picture, feature == static_cast<double>(Feature::crack), {255, 0, 255});
@@ -55,8 +52,7 @@ void draw_borders(cv::Mat& picture, const Specimen& specimen, int thickness) {
 }
 
 void draw_directions(cv::Mat& picture, const Specimen& specimen, int thickness) {
-    if (specimen.orientation.empty())
-        return;
+    if (specimen.orientation.empty()) return;
     const int step = std::max(12, std::max(specimen.columns, specimen.rows) / 40);
     for (int y = step / 2; y < specimen.rows; y += step)
         for (int x = step / 2; x < specimen.columns; x += step) {
@@ -75,8 +71,7 @@ cv::Mat class_map(const Specimen& specimen) {
     for (int y = 0; y < specimen.rows; ++y)
         for (int x = 0; x < specimen.columns; ++x) {
             const std::uint8_t label = specimen.label[static_cast<std::size_t>(y) * specimen.columns + x];
-            if (label != Specimen::void_label)
-                map.at<cv::Vec3b>(y, x) = early + (label / last) * (late - early);
+            if (label != Specimen::void_label) map.at<cv::Vec3b>(y, x) = early + (label / last) * (late - early);
         }
     return map;
 }
@@ -88,8 +83,7 @@ void check_preview_name(const std::filesystem::path& preview) {
         throw InputError("command line", "--preview", preview.string(), "must end as a picture does, such as .png");
     };
     try {
-        if (!cv::haveImageWriter(preview.string()))
-            fail();
+        if (!cv::haveImageWriter(preview.string())) fail();
     } catch (const cv::Exception&) {
         fail();
     }
@@ -103,17 +97,14 @@ void write_preview(const std::filesystem::path& image, const Specimen& specimen,
     draw_directions(picture, specimen, thickness);
     draw_borders(picture, specimen, thickness);
     cv::Mat both;
-    if (picture.cols > picture.rows)
-        cv::vconcat(picture, class_map(specimen), both);
-    else
-        cv::hconcat(picture, class_map(specimen), both);
+    if (picture.cols > picture.rows) cv::vconcat(picture, class_map(specimen), both);
+    else cv::hconcat(picture, class_map(specimen), both);
     bool written = false;
     try {
         written = cv::imwrite(preview.string(), both);
     } catch (const cv::Exception&) {
     }
-    if (!written)
-        throw InputError("command line", "--preview", preview.string(), "cannot be written");
+    if (!written) throw InputError("command line", "--preview", preview.string(), "cannot be written");
 }
 
 }  // namespace crampfit

@@ -45,9 +45,7 @@ double RandomField::smooth(std::uint64_t stream, double x, double y, std::int64_
     const double row = std::floor(y);
     const double s = cubic_step(y - row);
     // Each row of the lattice is a line of its own: its stream is drawn from the row's number.
-    const auto line = [&](std::int64_t j) {
-        return smooth(mix(stream) + static_cast<std::uint64_t>(wrap(j, period)), x);
-    };
+    const auto line = [&](std::int64_t j) { return smooth(mix(stream) + static_cast<std::uint64_t>(wrap(j, period)), x); };
     const auto j = static_cast<std::int64_t>(row);
     return ((1 - s) * line(j) + s * line(j + 1)) / std::sqrt(joined_variance);
 }

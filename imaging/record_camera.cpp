@@ -18,33 +18,33 @@ Vec2 upper_right(const Record& record, const std::filesystem::path& file) {
     if (record.point_position.empty())
         throw InputError(file.string(), "frames", "none", "there is nothing to photograph: give output.frames in the scene");
     Vec2 corner = Vec2::Zero();
-    for (const Vec2& place : record.point_position)
-        corner = corner.cwiseMax(place + 0.5 * record.point_size);
+    for (const Vec2& place : record.point_position) corner = corner.cwiseMax(place + 0.5 * record.point_size);
     return corner;
 }
 
 VirtualCameraOptions sized(VirtualCameraOptions options, const Vec2& size, double pixel) {
     const Vec2 count = (size / pixel - Vec2::Constant(1e-6)).array().ceil();  // 1e-6 of a pixel is rounding
     if (!(count.maxCoeff() <= most_side))
-        throw InputError("command line", "--pixel", fmt::format("{:g} um", 1e6 * pixel),
-                         fmt::format("makes a picture of {:.0f} x {:.0f} pixels: at most {} a side", count.x(), count.y(), most_side));
+        throw InputError(
+            "command line", "--pixel", fmt::format("{:g} um", 1e6 * pixel),
+            fmt::format("makes a picture of {:.0f} x {:.0f} pixels: at most {} a side", count.x(), count.y(), most_side));
     options.columns = static_cast<int>(count.x());
     options.rows = static_cast<int>(count.y());
     return options;
 }
 
 Surface seen_in(const CameraView& view, const std::function<double(const Vec2&)>& wood) {
-    if (!wood)
-        return {};
+    if (!wood) return {};
     return [=](const Vec2& px) { return wood(view.to_specimen(px)); };
 }
 
 }  // namespace
 
-RecordCamera::RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin, VirtualCameraOptions options,
-                           const std::function<double(const Vec2&)>& wood)
-    : record_(record), file_(file),
-      view_{Vec2::Constant(-margin), pixel, (options = sized(options, upper_right(record, file) + Vec2::Constant(2 * margin), pixel)).rows},
+RecordCamera::RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin,
+                           VirtualCameraOptions options, const std::function<double(const Vec2&)>& wood)
+    : record_(record),
+      file_(file), view_{Vec2::Constant(-margin), pixel,
+                         (options = sized(options, upper_right(record, file) + Vec2::Constant(2 * margin), pixel)).rows},
       camera_(options, seen_in(view_, wood)) {}
 
 GrayPicture RecordCamera::reference() const {

@@ -7,8 +7,8 @@
 
 namespace crampfit {
 
-/// How a picture lies on the specimen: upright, its lower left corner at `corner`. Pixels count from the centre of the first one, x to the
-/// right and y down.
+/// How a picture lies on the specimen: upright, its lower left corner at `corner`. Pixels count from the centre of the first one,
+/// x to the right and y down.
 struct CameraView {
     Vec2 corner = Vec2::Zero();  // in the specimen [m]
     double pixel = 0;            // edge of a pixel [m]
@@ -21,18 +21,19 @@ struct CameraView {
     }
 };
 
-/// A virtual camera before the specimen of a record: its frames displace what is to be seen on the material, a speckle pattern or its own wood.
+/// A virtual camera before the specimen of a record: its frames displace what is to be seen on the material, a speckle pattern or
+/// its own wood.
 class RecordCamera {
   public:
-    /// Looks at the whole specimen and `margin` [m] around it; `options` give all but the size of the picture. The record must outlive
-    /// this; `file` is what errors call it. `wood` is the gray of the bare wood at a place of the specimen [m]; empty: there is a pattern on it.
-    /// Throws InputError for a record without points, or a picture of more than 16384 pixels a side.
-    RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin, VirtualCameraOptions options,
-                 const std::function<double(const Vec2&)>& wood = {});
+    /// Looks at the whole specimen and `margin` [m] around it; `options` give all but the size of the picture. The record must
+    /// outlive this; `file` is what errors call it. `wood` is the gray of the bare wood at a place of the specimen [m]; empty:
+    /// there is a pattern on it. Throws InputError for a record without points, or a picture of more than 16384 pixels a side.
+    RecordCamera(const Record& record, const std::filesystem::path& file, double pixel, double margin,
+                 VirtualCameraOptions options, const std::function<double(const Vec2&)>& wood = {});
 
     const CameraView& view() const { return view_; }
 
-    GrayPicture reference() const;         // of the unloaded specimen
+    GrayPicture reference() const;            // of the unloaded specimen
     GrayPicture photograph(int frame) const;  // may be called from several threads
 
   private:

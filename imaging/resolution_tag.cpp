@@ -25,8 +25,7 @@ class Bytes {
         const std::string_view part = text(at, count);
         std::uint32_t value = 0;
         if (part.size() == static_cast<std::size_t>(count))
-            for (int i = 0; i < count; ++i)
-                value = value << 8 | static_cast<std::uint8_t>(part[big_endian ? i : count - 1 - i]);
+            for (int i = 0; i < count; ++i) value = value << 8 | static_cast<std::uint8_t>(part[big_endian ? i : count - 1 - i]);
         return value;
     }
     std::size_t size() const { return bytes_.size(); }
@@ -44,10 +43,8 @@ double pixel(double x_per_metre, double y_per_metre) {
 double png(const Bytes& bytes) {
     for (std::size_t at = 8; at + 12 <= bytes.size(); at += 12 + bytes.number(at, 4)) {
         const std::string_view type = bytes.text(at + 4, 4);
-        if (type == "pHYs")
-            return bytes.number(at + 16, 1) == 1 ? pixel(bytes.number(at + 8, 4), bytes.number(at + 12, 4)) : 0;
-        if (type == "IDAT")
-            return 0;
+        if (type == "pHYs") return bytes.number(at + 16, 1) == 1 ? pixel(bytes.number(at + 8, 4), bytes.number(at + 12, 4)) : 0;
+        if (type == "IDAT") return 0;
     }
     return 0;
 }
@@ -58,8 +55,7 @@ double per_metre(double value, bool inch) { return inch ? value / 0.0254 : value
 /// JFIF 1.02: the APP0 segment right after the start of the image.
 double jpeg(const Bytes& bytes) {
     const std::uint32_t unit = bytes.number(13, 1);
-    if (bytes.number(2, 2) != 0xffe0 || bytes.text(6, 5) != std::string_view("JFIF\0", 5) || unit < 1 || unit > 2)
-        return 0;
+    if (bytes.number(2, 2) != 0xffe0 || bytes.text(6, 5) != std::string_view("JFIF\0", 5) || unit < 1 || unit > 2) return 0;
     return pixel(per_metre(bytes.number(14, 2), unit == 1), per_metre(bytes.number(16, 2), unit == 1));
 }
 
@@ -101,10 +97,8 @@ double pixel_by_tag(const std::filesystem::path& image) {
     std::ostringstream text;
     text << in.rdbuf();
     Bytes bytes(std::move(text).str());
-    if (bytes.text(0, 8) == "\x89PNG\r\n\x1a\n")
-        return png(bytes);
-    if (bytes.text(0, 3) == "\xff\xd8\xff")
-        return jpeg(bytes);
+    if (bytes.text(0, 8) == "\x89PNG\r\n\x1a\n") return png(bytes);
+    if (bytes.text(0, 3) == "\xff\xd8\xff") return jpeg(bytes);
     if (bytes.text(0, 4) == std::string_view("II*\0", 4) || bytes.text(0, 4) == std::string_view("MM\0*", 4))
         return tiff(std::move(bytes));
     if (bytes.text(0, 2) == "BM") {

@@ -31,8 +31,7 @@ class Directions {
         const double x = (p.x + 0.5) / field_.step - 0.5, y = (p.y + 0.5) / field_.step - 0.5;
         const double angle = 0.5 * std::atan2(sample(field_.sin2, x, y), sample(field_.cos2, x, y));
         cv::Point2d normal = frame_.direction({std::cos(angle), std::sin(angle)});
-        if (normal.y < 0)
-            normal = -normal;
+        if (normal.y < 0) normal = -normal;
         const double coherency = sample(field_.coherency, x, y);
         return {normal, std::max(coherency * coherency, least_trust)};
     }
@@ -79,8 +78,7 @@ RingCoordinate::RingCoordinate(const OrientationField& field, const GrowthFrame&
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns * rows);
     const auto add_triangle = [&](const std::array<cv::Point, 3>& corner) {
         std::array<cv::Point2d, 3> place;
-        for (int a = 0; a < 3; ++a)
-            place[a] = {corner[a].x * spacing_u_, corner[a].y * spacing_v_};
+        for (int a = 0; a < 3; ++a) place[a] = {corner[a].x * spacing_u_, corner[a].y * spacing_v_};
         const cv::Point2d middle = (place[0] + place[1] + place[2]) / 3;
         const auto [n, trust] = directions.at(middle.x, middle.y);
         const cv::Point2d t(-n.y, n.x);
@@ -89,9 +87,9 @@ RingCoordinate::RingCoordinate(const OrientationField& field, const GrowthFrame&
             const int row = corner[a].y * columns + corner[a].x;
             right[row] += trust * along_growth * n.dot(slopes[a]);
             for (int b = 0; b < 3; ++b)
-                entries.emplace_back(row, corner[b].y * columns + corner[b].x,
-                                     trust * (t.dot(slopes[a]) * t.dot(slopes[b]) +
-                                              along_growth * n.dot(slopes[a]) * n.dot(slopes[b])));
+                entries.emplace_back(
+                    row, corner[b].y * columns + corner[b].x,
+                    trust * (t.dot(slopes[a]) * t.dot(slopes[b]) + along_growth * n.dot(slopes[a]) * n.dot(slopes[b])));
         }
     };
     for (int j = 0; j + 1 < rows; ++j) {
@@ -109,8 +107,7 @@ RingCoordinate::RingCoordinate(const OrientationField& field, const GrowthFrame&
     for (int j = 0; j < rows; ++j)
         for (int i = 0; i < columns; ++i) {
             const double free = psi[j * columns + i];
-            values_.at<double>(j, i) =
-                j == 0 ? free : std::max(free, values_.at<double>(j - 1, i) + least_slope * spacing_v_);
+            values_.at<double>(j, i) = j == 0 ? free : std::max(free, values_.at<double>(j - 1, i) + least_slope * spacing_v_);
         }
     cv::minMaxLoc(values_, &lowest_, &highest_);
 }
@@ -142,19 +139,16 @@ double RingCoordinate::v(double u, double psi) const {
 void RingCoordinate::straighten_columns(const cv::Mat& in_frame, int first, int count, cv::Mat& straight) const {
     cv::Mat knots(count, values_.rows, CV_64F);
     for (int i = 0; i < count; ++i)
-        for (int j = 0; j < values_.rows; ++j)
-            knots.at<double>(i, j) = knot(first + i, j);
+        for (int j = 0; j < values_.rows; ++j) knots.at<double>(i, j) = knot(first + i, j);
     std::vector<int> lows(count, 0);
     for (int row = 0; row < straight.rows; ++row) {
         const double psi = lowest_ + row;
         for (int i = 0; i < count; ++i) {
             const double* at = knots.ptr<double>(i);
             int& low = lows[i];
-            while (low + 2 < values_.rows && at[low + 1] <= psi)
-                ++low;
+            while (low + 2 < values_.rows && at[low + 1] <= psi) ++low;
             const double place = spacing_v_ * (low + (psi - at[low]) / (at[low + 1] - at[low]));
-            if (place < 0 || place > in_frame.rows - 1)
-                continue;
+            if (place < 0 || place > in_frame.rows - 1) continue;
             const int u = first + i, j = std::min(static_cast<int>(place), in_frame.rows - 2);
             const auto a = static_cast<float>(place - j);
             straight.at<float>(row, u) = (1 - a) * in_frame.at<float>(j, u) + a * in_frame.at<float>(j + 1, u);
@@ -175,8 +169,7 @@ cv::Mat RingCoordinate::straighten(const cv::Mat& in_frame) const {
 
 cv::Mat RingCoordinate::map() const {
     cv::Mat rows(straight_rows(), frame_.width, CV_32F);
-    for (int row = 0; row < rows.rows; ++row)
-        rows.row(row) = static_cast<float>(row);
+    for (int row = 0; row < rows.rows; ++row) rows.row(row) = static_cast<float>(row);
     return bend(rows);
 }
 

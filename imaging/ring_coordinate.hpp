@@ -16,8 +16,8 @@ class RingCoordinate {
     /// rings, n across them; linear triangles.
     RingCoordinate(const OrientationField& field, const GrowthFrame& frame);
 
-    double psi(double u, double v) const;    // at a place in the frame; linear beyond its upper and lower edge
-    double v(double u, double psi) const;    // the row of a column at which psi has this value
+    double psi(double u, double v) const;  // at a place in the frame; linear beyond its upper and lower edge
+    double v(double u, double psi) const;  // the row of a column at which psi has this value
     double lowest() const { return lowest_; }
     double highest() const { return highest_; }
 
@@ -34,7 +34,7 @@ class RingCoordinate {
     double knot(double u, int row) const;
     void straighten_columns(const cv::Mat& in_frame, int first, int count, cv::Mat& straight) const;
 
-    cv::Mat values_;  // [knot rows x knot columns] double
+    cv::Mat values_;                        // [knot rows x knot columns] double
     double spacing_u_ = 1, spacing_v_ = 1;  // of knots [pixels]
     cv::Size frame_;
     double lowest_ = 0, highest_ = 0;

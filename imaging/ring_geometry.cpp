@@ -91,8 +91,8 @@ void RingGeometry::lay_rings() {
         ring.inner_radius = radius;
         radius += std::exp(log_mean + std::sqrt(log_variance) * random_.normal(ring_width, i));
         ring.outer_radius = radius;
-        ring.latewood_fraction = options_.latewood_fraction + std::sqrt(3.0) * options_.latewood_fraction_sd *
-                                                                  (2 * random_.uniform(latewood, i) - 1);
+        ring.latewood_fraction =
+            options_.latewood_fraction + std::sqrt(3.0) * options_.latewood_fraction_sd * (2 * random_.uniform(latewood, i) - 1);
         const double earlywood = (1 - ring.latewood_fraction) * (ring.outer_radius - ring.inner_radius);
         ring.transition = std::min(options_.transition, earlywood);
         rings_.push_back(ring);

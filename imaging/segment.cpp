@@ -23,9 +23,9 @@
 namespace crampfit {
 namespace {
 
-constexpr double least_coherency = 0.25;     // of the picture; noise has some 0.1
-constexpr int least_side = 16;               // pixels
-constexpr std::size_t most_pixels = 1 << 26; // some hundred bytes are needed for each
+constexpr double least_coherency = 0.25;      // of the picture; noise has some 0.1
+constexpr int least_side = 16;                // pixels
+constexpr std::size_t most_pixels = 1 << 26;  // some hundred bytes are needed for each
 
 /// Gray and colour as float, the brightest value 1.
 struct Pixels {
@@ -42,15 +42,13 @@ Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
         fail(fmt::format("is {} x {} pixels: at most 2^26 can be segmented", stored.cols, stored.rows));
     Pixels pixels;
     cv::Mat gray = stored;
-    if (stored.channels() == 3)
-        cv::cvtColor(stored, gray, cv::COLOR_BGR2GRAY);
+    if (stored.channels() == 3) cv::cvtColor(stored, gray, cv::COLOR_BGR2GRAY);
     double darkest = 0, brightest = 0;
     cv::minMaxLoc(gray, &darkest, &brightest);
     if (!(brightest > darkest))
         fail(brightest > 0 ? "shows nothing: all pixels are equally bright" : "shows nothing: all pixels are black");
     gray.convertTo(pixels.gray, CV_32F, 1 / brightest);
-    if (stored.channels() == 3)
-        stored.convertTo(pixels.bgr, CV_32FC3, 1 / brightest);
+    if (stored.channels() == 3) stored.convertTo(pixels.bgr, CV_32FC3, 1 / brightest);
     return pixels;
 }
 
@@ -72,8 +70,8 @@ OrientationScale first_scale(cv::Size picture) {
     return {2, {window, window}};
 }
 
-/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along them, where they
-/// wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
+/// Derivatives well within a ring, gathered over half a ring across the rings, where the next border is, and over less along
+/// them, where they wave; or more where rings are fine: noise. Without a ring width the middle between fine and coarse.
 OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
     if (!(ring_width > 0)) {
         const double window = std::clamp(shorter_side(frame.size()) / 25, 6.0, 60.0);
@@ -86,17 +84,14 @@ OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
 
 /// Why no rings can be traced; empty where they can.
 std::string obstacle(const OrientationField& field) {
-    if (cv::mean(field.coherency)[0] < least_coherency)
-        return "no rings: gray varies in all directions alike";
-    if (holds_pith(field))
-        return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
+    if (cv::mean(field.coherency)[0] < least_coherency) return "no rings: gray varies in all directions alike";
+    if (holds_pith(field)) return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
     return "";
 }
 
 std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, const GrowthFrame& frame) {
     std::vector<BorderLine> lines;
-    for (const BorderPolyline& border : borders)
-        lines.push_back(line_of(border, frame));
+    for (const BorderPolyline& border : borders) lines.push_back(line_of(border, frame));
     std::sort(lines.begin(), lines.end(), [](const BorderLine& a, const BorderLine& b) {
         const int middle = (std::max(a.first, b.first) + std::min(a.end(), b.end())) / 2;
         const auto at = [middle](const BorderLine& line) { return line.at(std::clamp(middle, line.first, line.end() - 1)); };
@@ -113,10 +108,8 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
     const RingCoordinate rings(round.orientation, frame);
     const StraightWood wood(gray, valid, rings);
     round.obstacle = obstacle(round.orientation);
-    if (!given.empty())
-        round.borders = lines_of(given, frame);
-    else if (round.obstacle.empty())
-        round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
+    if (!given.empty()) round.borders = lines_of(given, frame);
+    else if (round.obstacle.empty()) round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
     WoodLevels levels;
@@ -138,8 +131,8 @@ cv::Mat shown(const cv::Mat& blank) {
     return counts;
 }
 
-GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const OrientationField& orientation, const SegmentOptions& options,
-                     std::vector<std::string>& notes) {
+GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const OrientationField& orientation,
+                     const SegmentOptions& options, std::vector<std::string>& notes) {
     const GrowthGuess guess = guess_growth(gray, shown(blank), orientation);
     if (!options.growth) {
         notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
@@ -159,8 +152,7 @@ struct View {
     View reduced(double factor) const {
         View small;
         cv::resize(gray, small.gray, {}, factor, factor, cv::INTER_AREA);
-        if (!bgr.empty())
-            cv::resize(bgr, small.bgr, {}, factor, factor, cv::INTER_AREA);
+        if (!bgr.empty()) cv::resize(bgr, small.bgr, {}, factor, factor, cv::INTER_AREA);
         cv::resize(blank, small.blank, small.gray.size(), 0, 0, cv::INTER_NEAREST);
         return small;
     }
@@ -200,7 +192,8 @@ FirstLook look_first_at_some(const View& view, const SegmentOptions& options, st
 }
 
 /// Directions in the picture from what is turned into the frame.
-OrientationField orientation_in(const cv::Mat& gray, const cv::Mat& valid, const GrowthFrame& frame, const OrientationScale& scale) {
+OrientationField orientation_in(const cv::Mat& gray, const cv::Mat& valid, const GrowthFrame& frame,
+                                const OrientationScale& scale) {
     return measure_orientation(frame.turn_back(gray), frame.turn_back(valid) > 0, scale);
 }
 
@@ -224,8 +217,7 @@ void fill_maps(Specimen& specimen, const Round& round, const cv::Mat& classes, c
     specimen.feature.assign(feature.begin<std::uint8_t>(), feature.end<std::uint8_t>());
     for (std::size_t i = 0; i < specimen.label.size(); ++i) {
         const auto shown = static_cast<Feature>(specimen.feature[i]);
-        if (shown == Feature::background || shown == Feature::crack)
-            specimen.label[i] = Specimen::void_label;
+        if (shown == Feature::background || shown == Feature::crack) specimen.label[i] = Specimen::void_label;
     }
     const cv::Size size(specimen.columns, specimen.rows);
     const OrientationField& field = round.orientation;
@@ -262,15 +254,14 @@ OrientationField orientation_of(const std::filesystem::path& image, cv::Size siz
     const Pixels pixels = read_float(image, key);
     if (pixels.gray.size() != size)
         throw InputError(key.file, key.key, image.string(),
-                         fmt::format("is {} x {} pixels, the picture {} x {}: must have its size", pixels.gray.cols, pixels.gray.rows, size.width,
-                                     size.height));
+                         fmt::format("is {} x {} pixels, the picture {} x {}: must have its size", pixels.gray.cols,
+                                     pixels.gray.rows, size.width, size.height));
     return measure_orientation(pixels.gray, find_blank(pixels.gray, pixels.bgr) == 0, scale);
 }
 
 /// Directions away from the pith, as told or as they fit it best.
 void turn_from_pith(OrientationField& field, cv::Size picture, const SegmentOptions& options, std::vector<std::string>& notes) {
-    if (options.pith)
-        return turn_to_fan(field, fan_from({options.pith->x(), options.pith->y()}, picture));
+    if (options.pith) return turn_to_fan(field, fan_from({options.pith->x(), options.pith->y()}, picture));
     const std::optional<RadialFan> fan = fit_fan(field, picture);
     if (!fan) {
         notes.push_back("pith not fitted: the picture shows no directions");
@@ -283,7 +274,8 @@ void turn_from_pith(OrientationField& field, cv::Size picture, const SegmentOpti
                                 where, 180 / std::numbers::pi * fan->scatter));
 }
 
-void fill_density(Specimen& specimen, const std::filesystem::path& image, const DensityTable& table, std::vector<std::string>& notes) {
+void fill_density(Specimen& specimen, const std::filesystem::path& image, const DensityTable& table,
+                  std::vector<std::string>& notes) {
     const FinePicture gray = read_fine_gray(image, {"command line", "IMAGE"});
     std::vector<double> sum(specimen.classes.size(), 0.0);
     std::vector<long> count(sum.size(), 0);
@@ -298,32 +290,32 @@ void fill_density(Specimen& specimen, const std::filesystem::path& image, const 
     }
     for (std::size_t k = 0; k < sum.size(); ++k)
         if (count[k] > 0)
-            notes.push_back(fmt::format("density of {}: {:.0f} kg/m^3 on average", specimen.classes[k], sum[k] / static_cast<double>(count[k])));
+            notes.push_back(fmt::format("density of {}: {:.0f} kg/m^3 on average", specimen.classes[k],
+                                        sum[k] / static_cast<double>(count[k])));
 }
 
 }  // namespace
 
 void SegmentOptions::validate() const {
     const auto require = [](bool holds, const char* key, const std::string& value, const char* rule) {
-        if (!holds)
-            throw InputError("command line", key, value, rule);
+        if (!holds) throw InputError("command line", key, value, rule);
     };
     require(pixel >= 0 && std::isfinite(pixel), "--pixel", fmt::format("{} m", pixel), "must be a positive length");
     require(classes == 2 || classes == 3, "--classes", std::to_string(classes), "must be 2 or 3");
-    if (pith)
-        require(pith->allFinite(), "--pith", fmt::format("{},{}", pith->x(), pith->y()), "must be a place in pixels");
+    if (pith) require(pith->allFinite(), "--pith", fmt::format("{},{}", pith->x(), pith->y()), "must be a place in pixels");
     for (const GrayClass& range : gray) {
         const std::string text = fmt::format("{} {}-{}", range.material, range.low, range.high);
-        require(range.low >= 0 && range.low <= range.high && range.high <= 255, "--gray", text, "must be 0 <= low <= high <= 255");
+        require(range.low >= 0 && range.low <= range.high && range.high <= 255, "--gray", text,
+                "must be 0 <= low <= high <= 255");
         for (const GrayClass& other : gray)
-            require(&other == &range || range.high < other.low || other.high < range.low, "--gray", text, "ranges must not overlap");
+            require(&other == &range || range.high < other.low || other.high < range.low, "--gray", text,
+                    "ranges must not overlap");
     }
 }
 
 Segmentation segment(const std::filesystem::path& image, const SegmentOptions& options) {
     options.validate();
-    if (options.threads > 0)
-        cv::setNumThreads(options.threads);
+    if (options.threads > 0) cv::setNumThreads(options.threads);
     Segmentation result;
     const PictureKey key{"command line", "IMAGE"};
     const Pixels pixels = read_float(image, key);
@@ -337,35 +329,30 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     const GrowthFrame frame(first.growth, view.gray.size());
     const cv::Mat gray = flatten(frame.turn(view.gray), first.valid), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
     const OrientationScale scale = scale_for(first.ring_width, frame);
-    Round second = look(gray, bgr, frame.turn(view.blank), first.valid, frame, orientation_in(gray, first.valid, frame, scale), first.ring_width,
-                        options.borders);
+    Round second = look(gray, bgr, frame.turn(view.blank), first.valid, frame, orientation_in(gray, first.valid, frame, scale),
+                        first.ring_width, options.borders);
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
     cv::Mat classes;
     if (options.gray.empty()) {
-        specimen.classes = options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"}
-                                                : std::vector<std::string>{"EW", "LW"};
+        specimen.classes =
+            options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"} : std::vector<std::string>{"EW", "LW"};
         classes = classify(second.degree, options.classes, width);
     } else {
         classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
     }
-    if (!options.direction.empty())
-        second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
-    if (options.fit_pith || options.pith)
-        turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);
-    else if (options.direction.empty())
-        turn_to_borders(second.orientation, second.borders, frame, width);
+    if (!options.direction.empty()) second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
+    if (options.fit_pith || options.pith) turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);
+    else if (options.direction.empty()) turn_to_borders(second.orientation, second.borders, frame, width);
     fill_maps(specimen, second, classes, frame);
-    if (options.density)
-        fill_density(specimen, image, *options.density, result.notes);
+    if (options.density) fill_density(specimen, image, *options.density, result.notes);
     for (std::size_t i = 0; i < second.borders.size(); ++i)
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
     specimen.rings = ring_figures(second.borders, classes, static_cast<int>(specimen.classes.size()) - 1, second.features);
-    if (!second.obstacle.empty() && options.borders.empty())
-        result.notes.push_back(second.obstacle);
+    if (!second.obstacle.empty() && options.borders.empty()) result.notes.push_back(second.obstacle);
     result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
-                                       specimen.borders.size(), options.borders.empty() ? "" : " as given",
-                                       specimen.rings.size(), second.ring_width));
+                                       specimen.borders.size(), options.borders.empty() ? "" : " as given", specimen.rings.size(),
+                                       second.ring_width));
     return result;
 }
 

@@ -13,16 +13,17 @@
 namespace crampfit {
 
 struct SegmentOptions {
-    double pixel = 0;              // edge of a pixel [m]; 0: from the file's resolution tag, where there is one
+    double pixel = 0;                    // edge of a pixel [m]; 0: from the file's resolution tag, where there is one
     std::string pixel_from = "--pixel";  // what it was told by, for the notes
-    int classes = 2;               // 2: EW, LW; 3: EW, transition, LW
+    int classes = 2;                     // 2: EW, LW; 3: EW, transition, LW
     std::optional<GrowthAxis> growth = std::nullopt;  // from pith to bark; none: told from the picture
-    std::vector<BorderPolyline> borders = {};  // corrected by hand; empty: found
-    std::vector<GrayClass> gray = {};          // classes by the picture's own gray; empty: by each ring's; grays in no range are void
+    std::vector<BorderPolyline> borders = {};         // corrected by hand; empty: found
+    std::vector<GrayClass> gray = {};  // classes by the picture's own gray; empty: by each ring's; grays in no range are void
     std::optional<DensityTable> density = std::nullopt;  // what the picture's own gray stands for
-    int threads = 0;               // of OpenCV in this process; 0: as they are
-    std::filesystem::path direction = {};      // picture of the same wood, as large, that the radial direction is seen in; empty: the same
-    bool fit_pith = false;         // radial directions away from the place that they fit best
+    int threads = 0;                                     // of OpenCV in this process; 0: as they are
+    // Picture of the same wood, as large, that the radial direction is seen in; empty: the same.
+    std::filesystem::path direction = {};
+    bool fit_pith = false;                    // radial directions away from the place that they fit best
     std::optional<Vec2> pith = std::nullopt;  // or away from here [pixels]
 
     /// Throws InputError for anything out of range.

@@ -15,8 +15,7 @@ constexpr float gain = 36.0f;
 constexpr int horizon = 16;  // pole^16 is below a float's last digit
 
 int mirrored(int i, int count) {
-    if (count == 1)
-        return 0;
+    if (count == 1) return 0;
     const int period = 2 * (count - 1);
     i = ((i % period) + period) % period;
     return i < count ? i : period - i;
@@ -26,20 +25,16 @@ int mirrored(int i, int count) {
 void filter(float* samples, int count, std::size_t step, std::size_t width) {
     const auto line = [&](int i) { return samples + static_cast<std::size_t>(i) * step; };
     const auto combine = [&](float* here, float own, const float* other, float share) {
-        for (std::size_t j = 0; j < width; ++j)
-            here[j] = own * here[j] + share * other[j];
+        for (std::size_t j = 0; j < width; ++j) here[j] = own * here[j] + share * other[j];
     };
     std::vector<float> first(width, 0.0f);
     float power = 1.0f;
-    for (int k = 0; k < horizon; ++k, power *= pole)
-        combine(first.data(), 1.0f, line(mirrored(k, count)), power);
+    for (int k = 0; k < horizon; ++k, power *= pole) combine(first.data(), 1.0f, line(mirrored(k, count)), power);
     std::copy(first.begin(), first.end(), line(0));
-    for (int i = 1; i < count; ++i)
-        combine(line(i), 1.0f, line(i - 1), pole);
+    for (int i = 1; i < count; ++i) combine(line(i), 1.0f, line(i - 1), pole);
     const float end = pole / (pole * pole - 1.0f);
     combine(line(count - 1), end, line(mirrored(count - 2, count)), end * pole);
-    for (int i = count - 2; i >= 0; --i)
-        combine(line(i), -pole, line(i + 1), pole);
+    for (int i = count - 2; i >= 0; --i) combine(line(i), -pole, line(i + 1), pole);
 }
 
 }  // namespace
@@ -53,8 +48,7 @@ SplinePicture::SplinePicture(const FinePicture& picture)
         std::transform(gray, gray + columns_, line, [](float value) { return gain * value; });
         filter(line, columns_, 1, 1);
     }
-    filter(coefficients_.data() + index(0, 0), rows_, static_cast<std::size_t>(stride_),
-           static_cast<std::size_t>(columns_));
+    filter(coefficients_.data() + index(0, 0), rows_, static_cast<std::size_t>(stride_), static_cast<std::size_t>(columns_));
     mirror_margins();
 }
 
@@ -86,8 +80,7 @@ double SplinePicture::gray(double x, double y) const {
     const auto across = weights(xi - column), down = weights(yi - row);
     double sum = 0;
     for (int j = 0; j < 4; ++j)
-        for (int i = 0; i < 4; ++i)
-            sum += down[j] * across[i] * static_cast<double>(*at(column - 1 + i, row - 1 + j));
+        for (int i = 0; i < 4; ++i) sum += down[j] * across[i] * static_cast<double>(*at(column - 1 + i, row - 1 + j));
     return sum;
 }
 

@@ -12,8 +12,7 @@ namespace crampfit {
 /// image deformation"; reliability is the ZNCC). Points are taken in rounds of a fixed number, so that the result is
 /// the same for any number of threads. Gives a match for each point; its status is that of the last attempt, or
 /// `at_start`.
-std::vector<SubsetMatch> spread_matches(const ReferencePicture& reference, const FinePicture& image,
-                                        const PointLattice& lattice, const std::vector<PointStatus>& at_start,
-                                        int subset, int order, int threads);
+std::vector<SubsetMatch> spread_matches(const ReferencePicture& reference, const FinePicture& image, const PointLattice& lattice,
+                                        const std::vector<PointStatus>& at_start, int subset, int order, int threads);
 
 }  // namespace crampfit

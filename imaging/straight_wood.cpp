@@ -8,8 +8,8 @@
 namespace crampfit {
 namespace {
 
-/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) / 12 add up to
-/// sigma^2 within 1 %.
+/// Three running means in a row (Wells 1986) are a Gaussian whose cost does not grow with its width: their variances (w^2 - 1) /
+/// 12 add up to sigma^2 within 1 %.
 cv::Mat running_means(const cv::Mat& values, double sigma) {
     constexpr int means = 3;
     const int narrow = 2 * static_cast<int>((std::sqrt(12 * sigma * sigma / means + 1) - 1) / 2) + 1;
@@ -18,8 +18,7 @@ cv::Mat running_means(const cv::Mat& values, double sigma) {
     const int beyond = means * (narrow / 2 + 1);  // what a mean puts beyond the ends comes back with the next
     cv::Mat out;
     cv::copyMakeBorder(values, out, 0, 0, beyond, beyond, cv::BORDER_CONSTANT, 0);
-    for (int i = 0; i < means; ++i)
-        cv::blur(out, out, {i < wider ? narrow + 2 : narrow, 1}, {-1, -1}, cv::BORDER_CONSTANT);
+    for (int i = 0; i < means; ++i) cv::blur(out, out, {i < wider ? narrow + 2 : narrow, 1}, {-1, -1}, cv::BORDER_CONSTANT);
     return out.colRange(beyond, beyond + values.cols);
 }
 
@@ -33,10 +32,9 @@ cv::Mat blur_along(const cv::Mat& values, double sigma) {
             const cv::Range rows(band * i, std::min(values.rows, band * (i + 1)));
             cv::Mat blurred;
             if (sigma < 8)
-                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F), cv::Mat::ones(1, 1, CV_32F),
-                                {-1, -1}, 0, cv::BORDER_CONSTANT);
-            else
-                blurred = running_means(values.rowRange(rows), sigma);
+                cv::sepFilter2D(values.rowRange(rows), blurred, CV_32F, cv::getGaussianKernel(size, sigma, CV_32F),
+                                cv::Mat::ones(1, 1, CV_32F), {-1, -1}, 0, cv::BORDER_CONSTANT);
+            else blurred = running_means(values.rowRange(rows), sigma);
             blurred.copyTo(out.rowRange(rows));
         }
     });
@@ -54,10 +52,8 @@ StraightPicture StraightWood::blurred_along(double sigma) const {
 
 RowRange photographed_rows(const RingCoordinate& rings, const cv::Mat& blank, int column) {
     int top = 0, bottom = blank.rows - 1;
-    while (top < blank.rows && blank.at<std::uint8_t>(top, column))
-        ++top;
-    while (bottom > top && blank.at<std::uint8_t>(bottom, column))
-        --bottom;
+    while (top < blank.rows && blank.at<std::uint8_t>(top, column)) ++top;
+    while (bottom > top && blank.at<std::uint8_t>(bottom, column)) --bottom;
     return {rings.psi(column, top) - rings.lowest(), rings.psi(column, bottom) - rings.lowest()};
 }
 

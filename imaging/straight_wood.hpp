@@ -32,7 +32,8 @@ struct RowRange {
     bool holds(double row, double margin = 0) const { return row >= first + margin && row <= last - margin; }
 };
 
-/// The rows at which what is photographed in a column begins and ends, none where first > last: `blank` is 255 elsewhere (`find_blank`).
+/// The rows at which what is photographed in a column begins and ends, none where first > last: `blank` is 255 elsewhere
+/// (`find_blank`).
 RowRange photographed_rows(const RingCoordinate& rings, const cv::Mat& blank, int column);
 
 }  // namespace crampfit

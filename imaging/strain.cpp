@@ -22,17 +22,14 @@ int window_begin(int at, int count) { return std::clamp(at - reach, 0, std::max(
 std::vector<std::array<int, 2>> joined(const PointLattice& lattice, const DisplacementField& field, int point) {
     const int column = point % lattice.columns, row = point / lattice.columns;
     const int left = window_begin(column, lattice.columns) - column, top = window_begin(row, lattice.rows) - row;
-    const int right = std::min(left + edge, lattice.columns - column),
-              bottom = std::min(top + edge, lattice.rows - row);
+    const int right = std::min(left + edge, lattice.columns - column), bottom = std::min(top + edge, lattice.rows - row);
     std::array<bool, edge * edge> seen{};
     std::vector<std::array<int, 2>> places;
     const auto visit = [&](int dx, int dy) {
-        if (dx < left || dx >= right || dy < top || dy >= bottom)
-            return;
+        if (dx < left || dx >= right || dy < top || dy >= bottom) return;
         bool& here = seen[static_cast<std::size_t>((dy - top) * edge + dx - left)];
         const int neighbour = point + dx + dy * lattice.columns;
-        if (!here && field.status[static_cast<std::size_t>(neighbour)] == PointStatus::ok)
-            places.push_back({dx, dy});
+        if (!here && field.status[static_cast<std::size_t>(neighbour)] == PointStatus::ok) places.push_back({dx, dy});
         here = true;
     };
     visit(0, 0);
@@ -51,8 +48,7 @@ using Slopes = Eigen::Matrix2d;  // of u and v, a column each, along x and y, a 
 /// Least squares over the places given; nothing where they do not determine a polynomial.
 std::optional<Slopes> fit(const PointLattice& lattice, const DisplacementField& field, int point,
                           const std::vector<std::array<int, 2>>& places) {
-    if (places.size() < least_points)
-        return std::nullopt;
+    if (places.size() < least_points) return std::nullopt;
     Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 2> right = Eigen::Matrix<double, 6, 2>::Zero();
     for (const auto& [dx, dy] : places) {
@@ -63,8 +59,7 @@ std::optional<Slopes> fit(const PointLattice& lattice, const DisplacementField& 
     }
     // Places are whole numbers, so that a matrix that is singular is so up to rounding.
     const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factor(normal);
-    if (!(factor.rcond() > 1e-8))
-        return std::nullopt;
+    if (!(factor.rcond() > 1e-8)) return std::nullopt;
     return factor.solve(right).topRows<2>();
 }
 
@@ -82,12 +77,10 @@ Slopes fit_whole_window(const PointLattice& lattice, const DisplacementField& fi
 
 bool window_is_whole(const PointLattice& lattice, const DisplacementField& field, int point) {
     const int column = point % lattice.columns, row = point / lattice.columns;
-    if (column < reach || column + reach >= lattice.columns || row < reach || row + reach >= lattice.rows)
-        return false;
+    if (column < reach || column + reach >= lattice.columns || row < reach || row + reach >= lattice.rows) return false;
     for (int dy = -reach; dy <= reach; ++dy)
         for (int dx = -reach; dx <= reach; ++dx)
-            if (field.status[static_cast<std::size_t>(point + dx + dy * lattice.columns)] != PointStatus::ok)
-                return false;
+            if (field.status[static_cast<std::size_t>(point + dx + dy * lattice.columns)] != PointStatus::ok) return false;
     return true;
 }
 
@@ -99,8 +92,7 @@ void add_strain(const PointLattice& lattice, DisplacementField& field) {
         strain->assign(count, std::numeric_limits<double>::quiet_NaN());
     for (int point = 0; point < lattice.count(); ++point) {
         const auto at = static_cast<std::size_t>(point);
-        if (field.status[at] != PointStatus::ok)
-            continue;
+        if (field.status[at] != PointStatus::ok) continue;
         const std::optional<Slopes> slopes = window_is_whole(lattice, field, point)
                                                  ? fit_whole_window(lattice, field, point)
                                                  : fit(lattice, field, point, joined(lattice, field, point));

@@ -15,15 +15,14 @@ constexpr double settled = 5e-4;  // last step anywhere at the subset's edge [px
 /// Powers of xi and eta in the terms of a warp.
 constexpr std::array<std::array<std::size_t, 2>, 6> powers{{{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}};
 
-template <class Lanes, std::size_t Count> void clear(std::array<Lanes, Count>& sums) {
-    for (Lanes& sum : sums)
-        sum.setZero();
+template <class Lanes, std::size_t Count>
+void clear(std::array<Lanes, Count>& sums) {
+    for (Lanes& sum : sums) sum.setZero();
 }
 
 /// Adds each of `values` times 1, xi, xi^2, ... to its sums.
 template <class Lanes, std::size_t Count, std::size_t Kinds>
-void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lanes& xi,
-                   std::array<Lanes, Kinds> values) {
+void add_by_powers(std::array<std::array<Lanes, Count>, Kinds>& sums, const Lanes& xi, std::array<Lanes, Kinds> values) {
     for (std::size_t power = 0; power < Count; ++power)
         for (std::size_t kind = 0; kind < Kinds; ++kind) {
             sums[kind][power] += values[kind];
@@ -53,9 +52,8 @@ Eigen::Matrix<double, 6, 6> as_matrix(const Warp& warp, double half, std::integr
     const auto f = std::array{warp.u[5] / half, warp.v[5] / half};
     Eigen::Matrix<double, 6, 6> matrix;
     const auto product = [&](int row, int i, int j) {  // of the warped coordinates i and j
-        matrix.row(row) << a[i] * a[j] + c[i] * d[j] + d[i] * c[j],
-            a[i] * b[j] + b[i] * a[j] + c[i] * e[j] + e[i] * c[j], b[i] * b[j] + c[i] * f[j] + f[i] * c[j],
-            a[i] * c[j] + c[i] * a[j], b[i] * c[j] + c[i] * b[j], c[i] * c[j];
+        matrix.row(row) << a[i] * a[j] + c[i] * d[j] + d[i] * c[j], a[i] * b[j] + b[i] * a[j] + c[i] * e[j] + e[i] * c[j],
+            b[i] * b[j] + c[i] * f[j] + f[i] * c[j], a[i] * c[j] + c[i] * a[j], b[i] * c[j] + c[i] * b[j], c[i] * c[j];
     };
     product(0, 0, 0);
     product(1, 0, 1);
@@ -77,7 +75,8 @@ void set_warp(Warp& warp, const Eigen::Matrix<double, 6, 6>& m, double half) {
 }
 
 /// The warp that comes of undoing `step` first and then doing `warp`.
-template <int Order> void compose_inverse(Warp& warp, const Warp& step, double half) {
+template <int Order>
+void compose_inverse(Warp& warp, const Warp& step, double half) {
     constexpr std::integral_constant<int, Order> order;
     const auto now = as_matrix(warp, half, order);
     set_warp(warp, (now * as_matrix(step, half, order).inverse()).eval(), half);
@@ -86,8 +85,7 @@ template <int Order> void compose_inverse(Warp& warp, const Warp& step, double h
 /// Bounds the displacement that a warp can give anywhere in its subset [px].
 double reach(const std::array<double, 6>& terms) {
     double sum = 0;
-    for (const double term : terms)
-        sum += std::abs(term);
+    for (const double term : terms) sum += std::abs(term);
     return sum;
 }
 
@@ -99,11 +97,12 @@ FinePicture smooth(FinePicture picture, double radius) {
 }
 
 /// Spline values at `width` places: lane i lies (tx, ty) from the coefficient `at` + i.
-template <class Lanes> Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const Lanes& ty) {
+template <class Lanes>
+Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const Lanes& ty) {
     const auto weights = [](const Lanes& t) {
         const Lanes s = 1.0f - t, tt = t * t, ss = s * s;
-        return std::array<Lanes, 4>{ss * s * (1.0f / 6), 2.0f / 3 - tt * (1.0f - 0.5f * t),
-                                    2.0f / 3 - ss * (1.0f - 0.5f * s), tt * t * (1.0f / 6)};
+        return std::array<Lanes, 4>{ss * s * (1.0f / 6), 2.0f / 3 - tt * (1.0f - 0.5f * t), 2.0f / 3 - ss * (1.0f - 0.5f * s),
+                                    tt * t * (1.0f / 6)};
     };
     const std::array<Lanes, 4> wx = weights(tx), wy = weights(ty);
     Lanes value = Lanes::Zero();
@@ -135,13 +134,13 @@ SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const Spl
         inside_.push_back((from_left < static_cast<float>(subset)).template cast<float>());
         xi_.push_back((from_left - static_cast<float>(half_)) / static_cast<float>(half_));
     }
-    for (std::vector<Lanes>* lanes : {&gray_, &by_x_, &by_y_, &smooth_by_x_, &smooth_by_y_})
-        lanes->assign(count, Lanes::Zero());
+    for (std::vector<Lanes>* lanes : {&gray_, &by_x_, &by_y_, &smooth_by_x_, &smooth_by_y_}) lanes->assign(count, Lanes::Zero());
     sampled_.assign(blocks * width, 0.0f);
 }
 
 /// False when the subset is flat.
-template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
+template <int Order>
+bool SubsetMatcher<Order>::take_subset(int x, int y) {
     const int columns = reference_.picture.columns;
     const int subset = 2 * half_ + 1;
     const auto copy = [&](const std::vector<float>& from, std::vector<Lanes>& to) {
@@ -158,8 +157,7 @@ template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
 
     const double count = subset * subset;
     Lanes sum = Lanes::Zero();
-    for (std::size_t i = 0; i < gray_.size(); ++i)
-        sum += gray_[i] * inside_[i % static_cast<std::size_t>(blocks_)];
+    for (std::size_t i = 0; i < gray_.size(); ++i) sum += gray_[i] * inside_[i % static_cast<std::size_t>(blocks_)];
     mean_ = static_cast<double>(sum.sum()) / count;
     Lanes squares = Lanes::Zero();
     for (std::size_t i = 0; i < gray_.size(); ++i) {
@@ -174,18 +172,16 @@ template <int Order> bool SubsetMatcher<Order>::take_subset(int x, int y) {
 // slope products: sum of fx fx xi^a eta^b and so on, a + b up to twice the order. The gray's offset and gain are free
 // in ZNSSD, and what of the descents they can make up for is taken off: descents less their mean and less their part
 // along the reference's gray.
-template <int Order> void SubsetMatcher<Order>::make_matrices() {
+template <int Order>
+void SubsetMatcher<Order>::make_matrices() {
     constexpr int degree = 2 * Order;
     std::array<std::array<std::array<double, degree + 1>, degree + 1>, 7> moments{};
-    std::array<std::array<double, terms>, 8>
-        sums{};  // of the smooth slopes and the slopes, by x and y, alone and times the gray
+    std::array<std::array<double, terms>, 8> sums{};  // of the smooth slopes and the slopes, by x and y, alone and times the gray
     for (int row = 0; row <= 2 * half_; ++row) {
         std::array<std::array<Lanes, degree + 1>, 7> along;
         std::array<std::array<Lanes, Order + 1>, 8> first;
-        for (auto& lanes : along)
-            clear(lanes);
-        for (auto& lanes : first)
-            clear(lanes);
+        for (auto& lanes : along) clear(lanes);
+        for (auto& lanes : first) clear(lanes);
         for (int block = 0; block < blocks_; ++block) {
             const auto at = static_cast<std::size_t>(row * blocks_ + block);
             const Lanes &xi = xi_[static_cast<std::size_t>(block)], &f = gray_[at];
@@ -197,8 +193,7 @@ template <int Order> void SubsetMatcher<Order>::make_matrices() {
         for (std::size_t kind = 0; kind < moments.size(); ++kind)
             for (std::size_t a = 0; a <= degree; ++a) {
                 double sum = static_cast<double>(along[kind][a].sum());
-                for (std::size_t b = 0; a + b <= degree; ++b, sum *= eta)
-                    moments[kind][a][b] += sum;
+                for (std::size_t b = 0; a + b <= degree; ++b, sum *= eta) moments[kind][a][b] += sum;
             }
         const std::array<double, 3> by_eta{1, eta, eta * eta};
         for (std::size_t kind = 0; kind < sums.size(); ++kind)
@@ -237,13 +232,15 @@ template <int Order> void SubsetMatcher<Order>::make_matrices() {
 
 /// White noise of variance s^2 in what is left of the grays moves the parameters by covariance s^2 A^-1 B A^-T, A the
 /// tangent and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1.
-template <int Order> double SubsetMatcher<Order>::standard_error(double residual_variance) const {
+template <int Order>
+double SubsetMatcher<Order>::standard_error(double residual_variance) const {
     const Square inverse = tangent_.inverse();
     const auto variance = [&](int i) { return inverse.row(i).dot(inverse.row(i) * noise_); };
     return std::sqrt(residual_variance * (variance(0) + variance(terms)) / 2);
 }
 
-template <int Order> bool SubsetMatcher<Order>::stays_inside(int x, int y, const Warp& warp) const {
+template <int Order>
+bool SubsetMatcher<Order>::stays_inside(int x, int y, const Warp& warp) const {
     const auto inside = [&](int centre, const std::array<double, 6>& terms_of, std::size_t along, int count) {
         const double spread =
             std::abs(half_ + terms_of[along]) + reach(terms_of) - std::abs(terms_of[0]) - std::abs(terms_of[along]);
@@ -254,15 +251,15 @@ template <int Order> bool SubsetMatcher<Order>::stays_inside(int x, int y, const
 }
 
 /// Fills `sampled_` with the image's gray at the warped places of one row.
-template <int Order> void SubsetMatcher<Order>::sample_row(int x, int y, const Warp& warp, int row) {
+template <int Order>
+void SubsetMatcher<Order>::sample_row(int x, int y, const Warp& warp, int row) {
     // Whole pixels of the centre's displacement are kept apart: what is left is small, and exact enough in single
     // precision.
     const double whole_u = std::floor(warp.u[0]), whole_v = std::floor(warp.v[0]);
     const auto eta = static_cast<float>(static_cast<double>(row - half_) / half_);
     const auto along = [&](const std::array<double, 6>& t, double whole) {  // coefficients of 1, xi, xi^2
         const auto f = [](double value) { return static_cast<float>(value); };
-        return std::array<float, 3>{f(t[0] - whole) + eta * (f(t[2]) + eta * f(t[5])), f(t[1]) + eta * f(t[4]),
-                                    f(t[3])};
+        return std::array<float, 3>{f(t[0] - whole) + eta * (f(t[2]) + eta * f(t[5])), f(t[1]) + eta * f(t[4]), f(t[3])};
     };
     const std::array<float, 3> u = along(warp.u, whole_u), v = along(warp.v, whole_v);
     const float* origin = image_.at(x - half_ + static_cast<int>(whole_u), y - half_ + row + static_cast<int>(whole_v));
@@ -296,7 +293,8 @@ template <int Order> void SubsetMatcher<Order>::sample_row(int x, int y, const W
     }
 }
 
-template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::sample(int x, int y, const Warp& warp) {
+template <int Order>
+typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::sample(int x, int y, const Warp& warp) {
     Lanes gray = Lanes::Zero(), squared = Lanes::Zero(), by_reference = Lanes::Zero();
     std::array<Lanes, 2 * terms> by_descent;
     clear(by_descent);
@@ -309,8 +307,8 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
         for (int block = 0; block < blocks_; ++block) {
             const auto at = static_cast<std::size_t>(row * blocks_ + block);
             const Lanes& xi = xi_[static_cast<std::size_t>(block)];
-            const Lanes g = (Eigen::Map<const Lanes>(sampled_.data() + block * width) - mean) *
-                            inside_[static_cast<std::size_t>(block)];
+            const Lanes g =
+                (Eigen::Map<const Lanes>(sampled_.data() + block * width) - mean) * inside_[static_cast<std::size_t>(block)];
             gray += g;
             squared += g * g;
             by_reference += g * gray_[at];
@@ -332,16 +330,13 @@ template <int Order> typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::s
             by_descent[terms + m] += by_y[a] * by_eta[b];
         }
     }
-    Sums sums{static_cast<double>(gray.sum()),
-              static_cast<double>(squared.sum()),
-              static_cast<double>(by_reference.sum()),
-              {}};
-    for (int m = 0; m < 2 * terms; ++m)
-        sums.by_descent[m] = static_cast<double>(by_descent[static_cast<std::size_t>(m)].sum());
+    Sums sums{static_cast<double>(gray.sum()), static_cast<double>(squared.sum()), static_cast<double>(by_reference.sum()), {}};
+    for (int m = 0; m < 2 * terms; ++m) sums.by_descent[m] = static_cast<double>(by_descent[static_cast<std::size_t>(m)].sum());
     return sums;
 }
 
-template <int Order> SubsetMatch SubsetMatcher<Order>::match(int x, int y, const Warp& guess) {
+template <int Order>
+SubsetMatch SubsetMatcher<Order>::match(int x, int y, const Warp& guess) {
     SubsetMatch found;
     if (!take_subset(x, y)) {
         found.status = PointStatus::no_contrast;
@@ -366,8 +361,7 @@ template <int Order> SubsetMatch SubsetMatcher<Order>::match(int x, int y, const
         // Pan et al. (2013) eq. 7 with smooth descents, and the sums over the image's gray taken apart.
         const Parameters slope = descent_by_gray_ - norm_ / norm * (sums.by_descent - mean * descent_);
         const Parameters step = -tangent_.solve(slope);
-        if (!step.allFinite() || step.template lpNorm<Eigen::Infinity>() > half_)
-            return found;
+        if (!step.allFinite() || step.template lpNorm<Eigen::Infinity>() > half_) return found;
         Warp update;
         std::copy_n(step.data(), terms, update.u.begin());
         std::copy_n(step.data() + terms, terms, update.v.begin());

@@ -39,8 +39,7 @@ struct SubsetMatch {
     double zncc = 0;      // zero-normalised correlation coefficient
     double residual = 0;  // variance of what is left of the grays [gray^2]
     double slope = 0;     // mean square of the reference's slope along x or y, fine details left out [gray^2/px^2]
-    double sigma =
-        0;  // standard error of u[0] and v[0] (root mean square of the two), by the noise of the pictures [px]
+    double sigma = 0;     // standard error of u[0] and v[0] (root mean square of the two), by the noise of the pictures [px]
 };
 
 /// Follows a square subset of the reference into an image by inverse-compositional Gauss-Newton: Pan, Li and Tong
@@ -55,7 +54,8 @@ struct SubsetMatch {
 /// rest. To smooth both pictures does the same for translations (Pan 2013, "Bias error reduction of digital image
 /// correlation using Gaussian pre-filtering"), but not where one of them is stretched, and it mixes the two faces of a
 /// crack.
-template <int Order> class SubsetMatcher {
+template <int Order>
+class SubsetMatcher {
   public:
     /// `subset` is odd. The pictures must outlive the matcher.
     SubsetMatcher(const ReferencePicture& reference, const SplinePicture& image, int subset);

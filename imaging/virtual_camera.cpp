@@ -27,8 +27,7 @@ std::optional<Vec2> origin_of(const Vec2& seen, const PlaneDisplacement& displac
     Vec2 place = seen;
     for (int i = 0; i < most_trials; ++i) {
         const Vec2 next = seen - displacement(place);
-        if ((next - place).squaredNorm() < close_enough * close_enough)
-            return next;
+        if ((next - place).squaredNorm() < close_enough * close_enough) return next;
         place = next;
     }
     return std::nullopt;
@@ -38,8 +37,7 @@ std::optional<Vec2> origin_of(const Vec2& seen, const PlaneDisplacement& displac
 
 void VirtualCameraOptions::validate() const {
     const auto require = [](bool holds, const char* option, double value, const char* rule) {
-        if (!holds)
-            throw InputError("virtual camera", option, fmt::format("{}", value), rule);
+        if (!holds) throw InputError("virtual camera", option, fmt::format("{}", value), rule);
     };
     require(columns > 0 && columns <= 16384, "columns", columns, "must be from 1 to 16384");
     require(rows > 0 && rows <= 16384, "rows", rows, "must be from 1 to 16384");
@@ -55,8 +53,7 @@ void VirtualCameraOptions::validate() const {
 VirtualCamera::VirtualCamera(const VirtualCameraOptions& options, Surface surface)
     : options_(options), surface_(std::move(surface)), cell_(2 * options.spot_radius) {
     options.validate();
-    if (surface_)
-        return;
+    if (surface_) return;
     const RandomField random(options.seed);
     cells_across_ = static_cast<int>(std::ceil((options.columns + 2 * border) / cell_));
     const int cells_down = static_cast<int>(std::ceil((options.rows + 2 * border) / cell_));
@@ -92,16 +89,17 @@ GrayPicture VirtualCamera::photograph(std::uint64_t shot) const {
 }
 
 double VirtualCamera::gray_of(const std::optional<Vec2>& origin, const Coverage& covered) const {
-    if (!origin || (covered && !covered(*origin)))
-        return options_.gap_gray;
+    if (!origin || (covered && !covered(*origin))) return options_.gap_gray;
     return surface_ ? surface_(*origin) : pattern(*origin);
 }
 
 /// Over the pixel's square. Where its neighbours show that nothing jumps there, what lies in it follows from them.
-double VirtualCamera::mean_gray(int x, int y, const Origins& origins, const PlaneDisplacement& displacement, const Coverage& covered) const {
+double VirtualCamera::mean_gray(int x, int y, const Origins& origins, const PlaneDisplacement& displacement,
+                                const Coverage& covered) const {
     constexpr double least_jump = 0.005;  // change of the displacement from one step to the next [px]
     const auto at = [&](int column, int row) -> const std::optional<Vec2>& {
-        return origins[static_cast<std::size_t>(std::clamp(row, 0, options_.rows - 1) * options_.columns + std::clamp(column, 0, options_.columns - 1))];
+        return origins[static_cast<std::size_t>(std::clamp(row, 0, options_.rows - 1) * options_.columns +
+                                                std::clamp(column, 0, options_.columns - 1))];
     };
     const std::optional<Vec2>& middle = at(x, y);
     bool smooth = x > 0 && y > 0 && x + 1 < options_.columns && y + 1 < options_.rows && middle;
@@ -109,15 +107,15 @@ double VirtualCamera::mean_gray(int x, int y, const Origins& origins, const Plan
     for (const int axis : {0, 1}) {
         const std::optional<Vec2>&before = at(x - (axis == 0), y - (axis == 1)), &after = at(x + (axis == 0), y + (axis == 1));
         smooth = smooth && before && after && (*before - 2 * *middle + *after).norm() < least_jump;
-        if (smooth)
-            slope.col(axis) = 0.5 * (*after - *before);
+        if (smooth) slope.col(axis) = 0.5 * (*after - *before);
     }
     double sum = 0;
     const int side = options_.samples;
     for (int j = 0; j < side; ++j)
         for (int i = 0; i < side; ++i) {
             const Vec2 offset((i + 0.5) / side - 0.5, (j + 0.5) / side - 0.5);
-            sum += gray_of(smooth ? std::optional<Vec2>(*middle + slope * offset) : origin_of(Vec2(x, y) + offset, displacement), covered);
+            sum += gray_of(smooth ? std::optional<Vec2>(*middle + slope * offset) : origin_of(Vec2(x, y) + offset, displacement),
+                           covered);
         }
     return sum / (side * side);
 }
@@ -125,15 +123,14 @@ double VirtualCamera::mean_gray(int x, int y, const Origins& origins, const Plan
 GrayPicture VirtualCamera::photograph(const PlaneDisplacement& displacement, std::uint64_t shot, const Coverage& covered) const {
     Origins origins;
     for (int y = 0; y < options_.rows; ++y)
-        for (int x = 0; x < options_.columns; ++x)
-            origins.push_back(origin_of(Vec2(x, y), displacement));
+        for (int x = 0; x < options_.columns; ++x) origins.push_back(origin_of(Vec2(x, y), displacement));
     cv::Mat light(options_.rows, options_.columns, CV_64F);
     for (int y = 0; y < options_.rows; ++y)
         for (int x = 0; x < options_.columns; ++x)
-            light.at<double>(y, x) = options_.samples == 1 ? gray_of(origins[static_cast<std::size_t>(y * options_.columns + x)], covered)
-                                                           : mean_gray(x, y, origins, displacement, covered);
-    if (options_.blur > 0)
-        cv::GaussianBlur(light, light, {}, options_.blur);
+            light.at<double>(y, x) = options_.samples == 1
+                                         ? gray_of(origins[static_cast<std::size_t>(y * options_.columns + x)], covered)
+                                         : mean_gray(x, y, origins, displacement, covered);
+    if (options_.blur > 0) cv::GaussianBlur(light, light, {}, options_.blur);
     const RandomField random(options_.seed);
     GrayPicture picture{options_.columns, options_.rows, {}};
     for (int y = 0; y < options_.rows; ++y)

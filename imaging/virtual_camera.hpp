@@ -20,7 +20,8 @@ struct VirtualCameraOptions {
     double noise = 1;          // standard deviation of each pixel's gray, anew in each picture
     double gap_gray = 10;      // where a crack lets one see through
     double blur = 0;           // of the lens, standard deviation of a Gaussian [px]
-    int samples = 1;           // a side of the square that a pixel's gray is the mean of; a narrow gap darkens a pixel by its share only with some
+    // A side of the square that a pixel's gray is the mean of; a narrow gap darkens a pixel by its share only with some.
+    int samples = 1;
     std::uint64_t seed = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.
@@ -36,9 +37,9 @@ using Coverage = std::function<bool(const Vec2&)>;
 /// Gray of the surface at a place of the reference picture [px], 0..255.
 using Surface = std::function<double(const Vec2&)>;
 
-/// Photographs a surface that moves with a given displacement: a speckle pattern, if no other is given. The pattern is a sum of Gaussian spots
-/// at random places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the camera's noise and
-/// the rounding to whole grays.
+/// Photographs a surface that moves with a given displacement: a speckle pattern, if no other is given. The pattern is a sum of
+/// Gaussian spots at random places, known everywhere and not at pixels alone, so that what a picture shows is exact up to the
+/// camera's noise and the rounding to whole grays.
 class VirtualCamera {
   public:
     /// Throws InputError for bad options.
@@ -47,8 +48,8 @@ class VirtualCamera {
     /// The picture of the pattern at rest; `shot` numbers the picture: another number, other noise.
     GrayPicture photograph(std::uint64_t shot) const;
 
-    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1. Places of the
-    /// reference that `covered` says no to are no material, and show `gap_gray`.
+    /// The picture of the displaced pattern. A displacement may jump across a crack; its gradient must stay below 1. Places of
+    /// the reference that `covered` says no to are no material, and show `gap_gray`.
     GrayPicture photograph(const PlaneDisplacement& displacement, std::uint64_t shot, const Coverage& covered = {}) const;
 
   private:

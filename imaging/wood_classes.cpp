@@ -16,23 +16,20 @@ namespace crampfit {
 namespace {
 
 constexpr std::size_t least_pixels = 20;  // of a stretch of ring that tells its levels
-constexpr double dark_share = 0.03;   // of a ring, that is no brighter than its dark wood
-constexpr double bright_share = 0.90; // of a ring, that is no brighter than its bright wood
-constexpr double mixed = 1.5;          // pixels on either side of a border that show some of the other side
+constexpr double dark_share = 0.03;       // of a ring, that is no brighter than its dark wood
+constexpr double bright_share = 0.90;     // of a ring, that is no brighter than its bright wood
+constexpr double mixed = 1.5;             // pixels on either side of a border that show some of the other side
 
 /// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
 cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
     cv::Mat smooth, missing;
     for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
-        if (smooth.empty())
-            smooth = straight.gray;
-        else
-            straight.gray.copyTo(smooth, missing);
+        if (smooth.empty()) smooth = straight.gray;
+        else straight.gray.copyTo(smooth, missing);
         // A place whose neighbours along the ring hardly count is still to be filled.
         missing = straight.known < 0.3;
-        if (cv::countNonZero(missing) == 0)
-            break;
+        if (cv::countNonZero(missing) == 0) break;
     }
     return rings.bend(smooth);
 }
@@ -40,8 +37,7 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
 /// The line through some points by least squares, at a place.
 double line_at(double place, const std::vector<cv::Point2d>& points) {
     cv::Point2d mean;
-    for (const cv::Point2d& point : points)
-        mean += point / static_cast<double>(points.size());
+    for (const cv::Point2d& point : points) mean += point / static_cast<double>(points.size());
     double xx = 0, xy = 0;
     for (const cv::Point2d& point : points) {
         xx += (point.x - mean.x) * (point.x - mean.x);
@@ -53,7 +49,8 @@ double line_at(double place, const std::vector<cv::Point2d>& points) {
 /// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
 class RingProfile {
   public:
-    explicit RingProfile(double width) : sum_(static_cast<std::size_t>(std::max(1l, std::lround(width))), 0.0), count_(sum_.size(), 0) {}
+    explicit RingProfile(double width)
+        : sum_(static_cast<std::size_t>(std::max(1l, std::lround(width))), 0.0), count_(sum_.size(), 0) {}
 
     /// `place` is 0 at the inner border, 1 at the outer.
     void add(double place, float gray) {
@@ -61,8 +58,8 @@ class RingProfile {
         sum_[i] += gray;
         ++count_[i];
     }
-    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very beginning. Where an end
-    /// is not known it is what the means tend to there.
+    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very
+    /// beginning. Where an end is not known it is what the means tend to there.
     WoodLevels extremes(const std::optional<BorderGrays>& inner, const std::optional<BorderGrays>& outer) const {
         const std::size_t n = sum_.size(), reach = n / 40;
         std::vector<cv::Point2d> means;  // over the place in the ring, in steps
@@ -73,8 +70,7 @@ class RingProfile {
                 sum += sum_[k];
                 count += count_[k];
             }
-            if (count_[i] > 0)
-                means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
+            if (count_[i] > 0) means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
         }
         const auto [dark, bright] = std::ranges::minmax(means, {}, &cv::Point2d::y);
         const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
@@ -97,8 +93,8 @@ class RingProfile {
 class RingLevels {
   public:
     /// The ring between border `ring` - 1 and border `ring`.
-    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, const BorderEdges& edges, std::size_t ring,
-               int stretch) {
+    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, const BorderEdges& edges,
+               std::size_t ring, int stretch) {
         const BorderLine &inner = borders[ring - 1], &outer = borders[ring];
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
@@ -107,19 +103,16 @@ class RingLevels {
             std::optional<RingProfile> profile;
             std::vector<float> grays;
             for (int u = begin; u < end; u += step) {
-                if (!inner.covers(u) || !outer.covers(u))
-                    continue;
+                if (!inner.covers(u) || !outer.covers(u)) continue;
                 const double width = outer.at(u) - inner.at(u);
-                if (!profile)
-                    profile.emplace(width);
+                if (!profile) profile.emplace(width);
                 for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
                     if (valid.at<float>(v, u) > 0) {
                         grays.push_back(gray.at<float>(v, u));
                         profile->add((v - inner.at(u)) / width, grays.back());
                     }
             }
-            if (grays.size() < least_pixels)
-                continue;
+            if (grays.size() < least_pixels) continue;
             columns_.push_back(0.5 * (begin + end - 1));
             const int middle = (begin + end) / 2;
             levels_.push_back(profile->extremes(edges.at(ring - 1, middle), edges.at(ring, middle)));
@@ -133,10 +126,8 @@ class RingLevels {
 
     WoodLevels at(int u) const {
         const auto after = std::lower_bound(columns_.begin(), columns_.end(), u);
-        if (after == columns_.begin())
-            return levels_.front();
-        if (after == columns_.end())
-            return levels_.back();
+        if (after == columns_.begin()) return levels_.front();
+        if (after == columns_.end()) return levels_.back();
         const std::size_t i = static_cast<std::size_t>(after - columns_.begin());
         const double a = (u - columns_[i - 1]) / (columns_[i] - columns_[i - 1]);
         return {(1 - a) * levels_[i - 1].earlywood + a * levels_[i].earlywood,
@@ -146,8 +137,7 @@ class RingLevels {
     /// A stretch without its own LW or EW (a gap, a wedging ring) takes the picture's.
     void mend(const WoodLevels& typical) {
         for (WoodLevels& level : levels_)
-            if (level.contrast() < 0.3 * typical.contrast())
-                level = typical;
+            if (level.contrast() < 0.3 * typical.contrast()) level = typical;
     }
 
   private:
@@ -175,10 +165,8 @@ std::vector<double> otsu(const cv::Mat& values, const cv::Mat& counts, int class
                 const double share = (values.at<float>(v, u) - low) / (high - low);
                 ++mass[1 + static_cast<int>(std::clamp(share * bins, 0.0, bins - 1.0))];
             }
-    for (int i = 0; i < bins; ++i)
-        moment[i + 1] = moment[i] + mass[i + 1] * i;
-    for (int i = 0; i < bins; ++i)
-        mass[i + 1] += mass[i];
+    for (int i = 0; i < bins; ++i) moment[i + 1] = moment[i] + mass[i + 1] * i;
+    for (int i = 0; i < bins; ++i) mass[i + 1] += mass[i];
     const auto between = [&](int from, int to) {
         const double n = mass[to] - mass[from], m = moment[to] - moment[from];
         return n > 0 ? m * m / n : 0.0;
@@ -194,8 +182,7 @@ std::vector<double> otsu(const cv::Mat& values, const cv::Mat& counts, int class
             }
         }
     std::vector<double> thresholds{low + (high - low) * cuts.first / bins};
-    if (classes == 3)
-        thresholds.push_back(low + (high - low) * cuts.second / bins);
+    if (classes == 3) thresholds.push_back(low + (high - low) * cuts.second / bins);
     return thresholds;
 }
 
@@ -211,12 +198,10 @@ void remove_specks(cv::Mat& label, int one, int other, double least) {
     cv::Mat patches, figures, centres;
     const int count = cv::connectedComponentsWithStats(label == one, patches, figures, centres, 8);
     std::vector<char> small(count, 0);
-    for (int i = 1; i < count; ++i)
-        small[i] = figures.at<int>(i, cv::CC_STAT_AREA) < least;
+    for (int i = 1; i < count; ++i) small[i] = figures.at<int>(i, cv::CC_STAT_AREA) < least;
     for (int v = 0; v < label.rows; ++v)
         for (int u = 0; u < label.cols; ++u)
-            if (small[patches.at<int>(v, u)])
-                label.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(other);
+            if (small[patches.at<int>(v, u)]) label.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(other);
 }
 
 }  // namespace
@@ -227,13 +212,11 @@ cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
     std::vector<int> outside(frame.width, 0);  // number of what lies there
     for (std::size_t i = 0; i < borders.size(); ++i)
         for (int u = std::max(0, borders[i].first); u < std::min(frame.width, borders[i].end()); ++u) {
-            for (int& v = next[u]; v < frame.height && v <= borders[i].at(u); ++v)
-                numbers.at<int>(v, u) = static_cast<int>(i);
+            for (int& v = next[u]; v < frame.height && v <= borders[i].at(u); ++v) numbers.at<int>(v, u) = static_cast<int>(i);
             outside[u] = static_cast<int>(i) + 1;
         }
     for (int u = 0; u < frame.width; ++u)
-        for (int v = next[u]; v < frame.height; ++v)
-            numbers.at<int>(v, u) = outside[u];
+        for (int v = next[u]; v < frame.height; ++v) numbers.at<int>(v, u) = outside[u];
     return numbers;
 }
 
@@ -241,7 +224,7 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
                        const std::vector<BorderLine>& borders, double ring_width, WoodLevels& range) {
     const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
     const BorderEdges edges(smooth, valid, borders, ring_width);
-    std::vector<RingLevels> whole;          // rings that lie between two borders
+    std::vector<RingLevels> whole;  // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
         RingLevels ring(smooth, valid, borders, edges, i, std::max(40, static_cast<int>(ring_width)));
@@ -251,14 +234,11 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
         }
     }
     range = whole.empty() ? otsu_levels(smooth, valid) : usual_range(whole);
-    for (RingLevels& ring : whole)
-        ring.mend(range);
+    for (RingLevels& ring : whole) ring.mend(range);
     for (std::size_t i = 1; i < nearest_whole.size(); ++i)
-        if (nearest_whole[i] < 0)
-            nearest_whole[i] = nearest_whole[i - 1];
+        if (nearest_whole[i] < 0) nearest_whole[i] = nearest_whole[i - 1];
     for (std::size_t i = nearest_whole.size() - 1; i-- > 0;)
-        if (nearest_whole[i] < 0)
-            nearest_whole[i] = nearest_whole[i + 1];
+        if (nearest_whole[i] < 0) nearest_whole[i] = nearest_whole[i + 1];
 
     const cv::Mat numbers = ring_numbers(borders, valid.size());
     cv::Mat degree(valid.size(), CV_32F);
@@ -272,11 +252,9 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
                 const auto ring = static_cast<std::size_t>(numbers.at<int>(v, u));
                 float gray = smooth.at<float>(v, u);
                 if (distance(ring, u, v) > -mixed && distance(ring, u, v) <= 0)
-                    for (int i = std::max(0, v - 2); i < v; ++i)
-                        gray = std::min(gray, smooth.at<float>(i, u));
+                    for (int i = std::max(0, v - 2); i < v; ++i) gray = std::min(gray, smooth.at<float>(i, u));
                 else if (ring > 0 && distance(ring - 1, u, v) < mixed)
-                    for (int i = std::min(valid.rows - 1, v + 2); i > v; --i)
-                        gray = std::max(gray, smooth.at<float>(i, u));
+                    for (int i = std::min(valid.rows - 1, v + 2); i > v; --i) gray = std::max(gray, smooth.at<float>(i, u));
                 const WoodLevels here = nearest_whole[ring] < 0 ? range : whole[nearest_whole[ring]].at(u);
                 degree.at<float>(v, u) = static_cast<float>((here.earlywood - gray) / std::max(here.contrast(), 1e-6));
             }
@@ -286,15 +264,12 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
 
 cv::Mat classify(const cv::Mat& degree, int classes, double ring_width) {
     std::vector<double> thresholds{0.5};
-    if (classes == 3)
-        thresholds = otsu(degree, cv::Mat::ones(degree.size(), CV_32F), 3, -0.25, 1.25);
+    if (classes == 3) thresholds = otsu(degree, cv::Mat::ones(degree.size(), CV_32F), 3, -0.25, 1.25);
     cv::Mat label = cv::Mat::zeros(degree.size(), CV_8U);
-    for (std::size_t i = 0; i < thresholds.size(); ++i)
-        label.setTo(static_cast<double>(i + 1), degree >= thresholds[i]);
+    for (std::size_t i = 0; i < thresholds.size(); ++i) label.setTo(static_cast<double>(i + 1), degree >= thresholds[i]);
     cv::medianBlur(label, label, 3);
     const double least = std::max(9.0, 0.02 * ring_width * ring_width);
-    for (int one = 0; one < classes; ++one)
-        remove_specks(label, one, one > 0 ? one - 1 : 1, least);
+    for (int one = 0; one < classes; ++one) remove_specks(label, one, one > 0 ? one - 1 : 1, least);
     return label;
 }
 

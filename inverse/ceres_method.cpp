@@ -86,8 +86,7 @@ Solution minimize_with_ceres(Objective& objective, const Eigen::VectorXd& start)
     if (residuals->lost_derivative()) {
         return {false, "too many runs failed around a point to have the derivative there"};
     }
-    const bool converged =
-        summary.termination_type == ceres::CONVERGENCE || summary.termination_type == ceres::USER_SUCCESS;
+    const bool converged = summary.termination_type == ceres::CONVERGENCE || summary.termination_type == ceres::USER_SUCCESS;
     return {converged && !objective.exhausted(), summary.message};
 }
 

@@ -17,7 +17,7 @@ constexpr double room = 3;               // for correlation, and from one window
 constexpr double errors_wide = 12;       // half width in standard errors: a difference is three quarters of one
 constexpr double agreement = 1.4;        // of a window with the errors that it finds
 constexpr int most_rounds = 6;
-constexpr int most_profiles = 4;         // in windows of rising width
+constexpr int most_profiles = 4;  // in windows of rising width
 
 bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
 
@@ -26,7 +26,8 @@ bool is_whole(const Window& window) { return window.width().minCoeff() >= 1.0; }
 // As far along each axis, either way, as the misfit needs to rise.
 Window as_wide_as_the_misfit_says(const Objective::Evaluate& near, const Eigen::VectorXd& x) {
     const Evaluation here = near(x, 1);
-    const double noise = std::max(1.0, here.misfit / static_cast<double>(std::max<Eigen::Index>(1, here.residuals.size() - x.size())));
+    const double noise =
+        std::max(1.0, here.misfit / static_cast<double>(std::max<Eigen::Index>(1, here.residuals.size() - x.size())));
     const auto distance = [&](Eigen::Index j, double side) {
         double d = first_distance;
         for (; d < 1.0; d *= 2) {
@@ -124,7 +125,8 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
     // Nothing where the user's stop comes before the first run.
     const auto look = [&](const Window& window) -> std::optional<CloseLook> {
         const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) { return near(window.inside(y), threads); };
-        CloseLook here{window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()), {}};
+        CloseLook here{
+            window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()), {}};
         spread_about(here.objective, window.share(x), difference_step, seed);
         if (!here.objective.best()) {
             return std::nullopt;

@@ -104,8 +104,9 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     weigh(models, spreads, std::max(1.0, unexplained), best.residuals.size());
     if (models.size() > 1) {
-        best.message = fmt::format("{} \"{}\" explains the data best, with {:.2g} of the evidence; next \"{}\" with {:.2g}. {}",
-                                   study.compared_key, models[0].name, models[0].weight, models[1].name, models[1].weight, best.message);
+        best.message =
+            fmt::format("{} \"{}\" explains the data best, with {:.2g} of the evidence; next \"{}\" with {:.2g}. {}",
+                        study.compared_key, models[0].name, models[0].weight, models[1].name, models[1].weight, best.message);
     }
     best.models = std::move(models);
     best.seconds = seconds;

@@ -13,10 +13,10 @@
 namespace crampfit {
 namespace {
 
-constexpr int places_along = 1000;       // at which a photographed path is compared
-constexpr double same_place = 1e-9;      // [m]
-constexpr int picture_side = 600;        // of the model's wood, its longer side [px]
-constexpr double light = 235, dark = 90; // gray of the first and the last material
+constexpr int places_along = 1000;        // at which a photographed path is compared
+constexpr double same_place = 1e-9;       // [m]
+constexpr int picture_side = 600;         // of the model's wood, its longer side [px]
+constexpr double light = 235, dark = 90;  // gray of the first and the last material
 
 /// The nearest place of a line to another place.
 struct Nearest {
@@ -131,7 +131,8 @@ std::vector<FittedModel> models_of(const Study& study, const Fit& fit) {
 
 }  // namespace
 
-void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std::vector<Vec2>>& initial, SimulatedPath& simulated) {
+void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std::vector<Vec2>>& initial,
+                   SimulatedPath& simulated) {
     const double stretch = length_of(photographed) / places_along;
     if (!(stretch > 0)) {
         return;
@@ -155,7 +156,8 @@ void compare_paths(const std::vector<Vec2>& photographed, const std::vector<std:
 }
 
 std::vector<CrackPaths> crack_paths(const Study& study, const Fit& fit, int threads, const std::atomic<bool>* stop) {
-    const bool photographed = std::ranges::any_of(study.experiments, [](const Experiment& experiment) { return experiment.photograph.has_value(); });
+    const bool photographed =
+        std::ranges::any_of(study.experiments, [](const Experiment& experiment) { return experiment.photograph.has_value(); });
     if (study.models.empty() && !photographed) {
         return {};
     }

@@ -9,9 +9,9 @@ namespace crampfit {
 /// A piecewise linear curve y(x). Units are the caller's.
 class Curve {
   public:
-    /// From rows in any order: rows with a NaN are skipped. Rows at the same x are a step there, from the mean of the first half of
-    /// them to that of the second: were a jump's two ends one point, it would lie half a row aside, wherever rows happen to be. At
-    /// least one row must be left.
+    /// From rows in any order: rows with a NaN are skipped. Rows at the same x are a step there, from the mean of the first half
+    /// of them to that of the second: were a jump's two ends one point, it would lie half a row aside, wherever rows happen to
+    /// be. At least one row must be left.
     Curve(std::span<const double> x, std::span<const double> y);
 
     /// Value that the curve has after its last node, instead of the last node's value.

@@ -10,7 +10,8 @@ namespace {
 using Stations = std::span<const FitResidual>;
 
 double range(Stations curve, double FitResidual::*member) {
-    const auto [low, high] = std::minmax_element(curve.begin(), curve.end(), [&](const auto& a, const auto& b) { return a.*member < b.*member; });
+    const auto [low, high] =
+        std::minmax_element(curve.begin(), curve.end(), [&](const auto& a, const auto& b) { return a.*member < b.*member; });
     return (*high).*member - (*low).*member;
 }
 
@@ -24,13 +25,15 @@ double unsigned_area(double width, double from, double to) {
 
 // The least, over all ways along both curves that never go back, of the longest leash (Eiter and Mannila 1994, table 1).
 double frechet(Stations curve) {
-    const double width = std::max(range(curve, &FitResidual::at), 1e-300), height = std::max(range(curve, &FitResidual::measured), 1e-300);
+    const double width = std::max(range(curve, &FitResidual::at), 1e-300),
+                 height = std::max(range(curve, &FitResidual::measured), 1e-300);
     const std::size_t n = curve.size();
     std::vector<double> row(n);
     for (std::size_t i = 0; i < n; ++i) {
         double diagonal = 0;
         for (std::size_t j = 0; j < n; ++j) {
-            const double leash = std::hypot((curve[i].at - curve[j].at) / width, (curve[i].measured - curve[j].modelled) / height);
+            const double leash =
+                std::hypot((curve[i].at - curve[j].at) / width, (curve[i].measured - curve[j].modelled) / height);
             const double above = row[j];
             const double reached = i == 0 && j == 0 ? 0.0
                                    : i == 0         ? row[j - 1]
@@ -48,7 +51,8 @@ double frechet(Stations curve) {
 std::vector<CurveDistance> curve_distances(const std::vector<FitResidual>& residuals) {
     std::vector<CurveDistance> distances;
     for (std::size_t begin = 0, end = 0; begin < residuals.size(); begin = end) {
-        while (end < residuals.size() && residuals[end].experiment == residuals[begin].experiment && residuals[end].kind == residuals[begin].kind) {
+        while (end < residuals.size() && residuals[end].experiment == residuals[begin].experiment &&
+               residuals[end].kind == residuals[begin].kind) {
             ++end;
         }
         const Stations curve(residuals.data() + begin, end - begin);

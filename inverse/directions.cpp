@@ -18,8 +18,7 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
     Directions result{best, model, radius, {}, {}, {}, {}, {}};
     // A parameter without any effect keeps a column of zeros.
     result.scale = jacobian.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian * result.scale.asDiagonal(),
-                                                Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian * result.scale.asDiagonal(), Eigen::ComputeThinU | Eigen::ComputeThinV);
     result.singular = svd.singularValues();
     result.u = svd.matrixU();
     result.v = svd.matrixV();
@@ -30,9 +29,7 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
 
 }  // namespace
 
-bool Directions::resolved(Eigen::Index k) const {
-    return singular[k] > std::max(resolution * singular[0], 2 * error[k]);
-}
+bool Directions::resolved(Eigen::Index k) const { return singular[k] > std::max(resolution * singular[0], 2 * error[k]); }
 
 bool Directions::all_resolved() const {
     for (Eigen::Index k = 0; k < singular.size(); ++k) {

@@ -54,7 +54,7 @@ class Sampler {
 
   private:
     double uniform() { return (static_cast<double>(generator_()) + 0.5) / 4294967296.0; }  // 2^32
-    double normal() {  // Box and Muller (1958)
+    double normal() {                                                                      // Box and Muller (1958)
         return std::sqrt(-2 * std::log(uniform())) * std::cos(2 * std::numbers::pi * uniform());
     }
 

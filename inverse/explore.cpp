@@ -52,8 +52,9 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
     }
     Objective& model = cheap ? objective : *polynomials;
     if (!cheap) {
-        result.message = "Profile and posterior rest on polynomials of the residuals over the runs about the best one, as each run "
-                         "of the model is dear. ";
+        result.message =
+            "Profile and posterior rest on polynomials of the residuals over the runs about the best one, as each run "
+            "of the model is dear. ";
     }
     if (choice.profile) {
         stage("profile");
@@ -87,7 +88,8 @@ Exploration explore(Objective& objective, const Uncertainty& uncertainty, const 
     return result;
 }
 
-void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty, const Exploration& exploration) {
+void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty,
+                      const Exploration& exploration) {
     fit.message += exploration.message;
     for (std::size_t j = 0; j < exploration.profiles.size(); ++j) {
         const auto k = static_cast<Eigen::Index>(j);
@@ -108,7 +110,9 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const 
         parameter.upper_95 = value_at(std::min(1.0, x + std::hypot(upper - x, own)));
         if (lower == 0.0 || upper == 1.0) {
             fit.message += fmt::format("The data do not bound '{}' {} within {}. ", parameter.name,
-                                       lower > 0.0 ? "above" : upper < 1.0 ? "below" : "above or below",
+                                       lower > 0.0   ? "above"
+                                       : upper < 1.0 ? "below"
+                                                     : "above or below",
                                        window.low[k] > 0.0 || window.high[k] < 1.0 ? "many standard errors" : "its bounds");
         }
     }

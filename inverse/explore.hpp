@@ -28,8 +28,9 @@ struct Exploration {
 Exploration explore(Objective& objective, const Uncertainty& uncertainty, const UncertaintyChoice& choice, int data_residuals,
                     bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage);
 
-/// Puts profile intervals in the place of those of the covariance, and fills in the tables. Uncertainty and exploration are those of
-/// a window of the box.
-void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty, const Exploration& exploration);
+/// Puts profile intervals in the place of those of the covariance, and fills in the tables. Uncertainty and exploration are those
+/// of a window of the box.
+void fill_exploration(Fit& fit, const UnitBox& box, const Window& window, const Uncertainty& uncertainty,
+                      const Exploration& exploration);
 
 }  // namespace crampfit

@@ -26,8 +26,8 @@ class Farm {
     virtual Evaluation evaluate(const Eigen::VectorXd& values) = 0;
 };
 
-/// Evaluates on `threads` threads of this process and in the places of a farm at the same time. What is asked for alone stays here,
-/// where the walks are that it may go on from.
+/// Evaluates on `threads` threads of this process and in the places of a farm at the same time. What is asked for alone stays
+/// here, where the walks are that it may go on from.
 class Sharing {
   public:
     Sharing(StudyFunction here, int threads, Farm* farm) : here_(std::move(here)), threads_(threads), farm_(farm) {}

@@ -35,8 +35,8 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
             if (fields.moved[k][i].allFinite()) {
                 points.push_back({i, fields.moved[k][i], experiment.noise.displacement_field.value_or(fields.sigma[k][i])});
                 if (!(points.back().sigma > 0)) {
-                    throw InputError(fields.file.string(), fmt::format("sigma of image {}", k), fmt::format("{:g}", points.back().sigma),
-                                     "must be positive: give noise.displacement_field");
+                    throw InputError(fields.file.string(), fmt::format("sigma of image {}", k),
+                                     fmt::format("{:g}", points.back().sigma), "must be positive: give noise.displacement_field");
                 }
             }
         }
@@ -56,8 +56,8 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
             }
         }
     }
-    remark_ = fmt::format("{}: displacements of {} points in {} pictures are compared, {} with no pixel in common{}.", experiment.name, followed,
-                          fields.instants.size(), places_.size(),
+    remark_ = fmt::format("{}: displacements of {} points in {} pictures are compared, {} with no pixel in common{}.",
+                          experiment.name, followed, fields.instants.size(), places_.size(),
                           camera_moves_ ? "; each picture may have moved and turned as a whole" : "");
 }
 
@@ -82,8 +82,10 @@ std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, co
     return values;
 }
 
-void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const {
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(3, 3);  // of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end
+void FieldComparison::move_with_camera(const std::vector<Point>& points, const std::vector<double>& share,
+                                       std::vector<Vec2>& values) const {
+    // Of any size: at three gcc 12 takes Eigen's blocks for reads beyond their end.
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(3, 3);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(3);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto rows = motion_at(places_[points[i].place] / reach_);
@@ -99,7 +101,8 @@ void FieldComparison::move_with_camera(const std::vector<Point>& points, const s
 
 std::vector<double> FieldComparison::modelled(const Record& record) const {
     if (record.probes.size() != pictures_.size()) {
-        throw std::invalid_argument(fmt::format("the run read {} of {} displacement fields", record.probes.size(), pictures_.size()));
+        throw std::invalid_argument(
+            fmt::format("the run read {} of {} displacement fields", record.probes.size(), pictures_.size()));
     }
     std::vector<Vec2> values;
     for (std::size_t k = 0; k < pictures_.size(); ++k) {

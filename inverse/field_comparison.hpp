@@ -9,16 +9,16 @@
 
 namespace crampfit {
 
-/// Measured displacement fields as stations at which a Record is compared with them, x and y of each point in each picture that was
-/// followed.
+/// Measured displacement fields as stations at which a Record is compared with them, x and y of each point in each picture that
+/// was followed.
 ///
-/// Where the camera may have moved, the small translation and rotation that brings the record's field nearest to the picture's is added to
-/// it, for each picture anew: what is left is free of them, at the cost of three numbers a picture (variable projection; Golub and Pereyra
-/// 1973). Then a field tells how strains go from place to place, and stiffness needs a force beside it.
+/// Where the camera may have moved, the small translation and rotation that brings the record's field nearest to the picture's is
+/// added to it, for each picture anew: what is left is free of them, at the cost of three numbers a picture (variable projection;
+/// Golub and Pereyra 1973). Then a field tells how strains go from place to place, and stiffness needs a force beside it.
 ///
-/// A point whose subset the simulated crack reaches is left out: there the record says what was measured. So is one that lies off the
-/// simulated material. Beyond, over the same distance once more, points come to count little by little, so that residuals are continuous
-/// in the crack's length.
+/// A point whose subset the simulated crack reaches is left out: there the record says what was measured. So is one that lies off
+/// the simulated material. Beyond, over the same distance once more, points come to count little by little, so that residuals are
+/// continuous in the crack's length.
 class FieldComparison {
   public:
     /// The experiment must have fields.
@@ -41,9 +41,9 @@ class FieldComparison {
     std::vector<Vec2> modelled(const std::vector<Point>& points, const ProbeReading& reading) const;
     void move_with_camera(const std::vector<Point>& points, const std::vector<double>& share, std::vector<Vec2>& values) const;
 
-    std::vector<Vec2> places_;                 // [m]
+    std::vector<Vec2> places_;  // [m]
     std::vector<std::vector<Point>> pictures_;
-    double reach_ = 0;                         // from the middle of a subset to its corner [m]
+    double reach_ = 0;  // from the middle of a subset to its corner [m]
     bool camera_moves_ = true;
     std::vector<FitResidual> stations_;
     std::string remark_;

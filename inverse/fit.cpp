@@ -41,8 +41,7 @@ double seconds_since(Clock::time_point begin) { return std::chrono::duration<dou
 /// Tells the caller after each run where the fit stands.
 class Reporter {
   public:
-    Reporter(const FitOptions& options, const Study& study, const UnitBox& box)
-        : options_(options), study_(study), box_(box) {
+    Reporter(const FitOptions& options, const Study& study, const UnitBox& box) : options_(options), study_(study), box_(box) {
         progress_.max_runs = study.optimizer.max_runs;
         progress_.best_misfit = std::numeric_limits<double>::infinity();
     }
@@ -112,8 +111,7 @@ void fill_parameters(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, con
 
 void fill_runs(Fit& fit, const UnitBox& box, const std::vector<Run>& runs) {
     for (const Run& run : runs) {
-        fit.runs.push_back(
-            {in_units(box, run.x), run.evaluation->misfit, run.evaluation->status, run.evaluation->seconds});
+        fit.runs.push_back({in_units(box, run.x), run.evaluation->misfit, run.evaluation->status, run.evaluation->seconds});
     }
 }
 
@@ -129,9 +127,8 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
     fill_parameters(fit, box, box.initial(), nothing);
     fit.misfit = nothing.reduced_chi_square;
     fit.reduced_chi_square = nothing.reduced_chi_square;
-    fit.message += objective.runs().empty()
-                       ? "No run was made."
-                       : "No run ended well; the first: " + objective.runs().front().evaluation->status;
+    fit.message += objective.runs().empty() ? "No run was made."
+                                            : "No run ended well; the first: " + objective.runs().front().evaluation->status;
 }
 
 // All that the lowest point of a cheap model hangs on beyond what the runs do.
@@ -186,7 +183,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const auto by_walk_of = [&](Forward (KeptWalks::*runs)(const std::vector<double>&) const) -> Near {
         return [&, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
             const Eigen::VectorXd values = model.box().values(point);
-            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), model.resolution(), options.stop_requested);
+            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), model.resolution(),
+                                                      options.stop_requested);
             return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
         };
     };
@@ -219,10 +217,11 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(),
                         walks.turn_with_toughness(), recall};
     // Steps on walks go on from the one before, where the walks are.
-    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
-                   by_walks || in_order ? nullptr : options.farm);
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); },
+                   threads, by_walks || in_order ? nullptr : options.farm);
     Objective objective(
-        box.size(), [&](const Eigen::VectorXd& x, int share) {
+        box.size(),
+        [&](const Eigen::VectorXd& x, int share) {
             const Eigen::VectorXd values = box.values(x);
             const auto run = [&shared, values, share] { return shared(values, share); };
             if (in_order && store.known(values)) {
@@ -244,8 +243,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
     const std::vector<int> lengths = model.curve_lengths();
     const double enough = nearby.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
-    SearchResult found = by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, box.initial(), options.seed, stage)
-                                  : search(objective, study.optimizer, box.initial(), options.seed, stage);
+    SearchResult found =
+        by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, box.initial(), options.seed, stage)
+                 : search(objective, study.optimizer, box.initial(), options.seed, stage);
     for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
         // How well the model knows what it says shows where it fits.
         const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
@@ -311,9 +311,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             exploration = look_around(uncertainty);
         }
         const Run best = *objective.best();
-        fit.status = objective.stopped() ? FitStatus::interrupted
-                     : found.converged   ? FitStatus::converged
-                                         : FitStatus::run_limit;
+        fit.status = objective.stopped() ? FitStatus::interrupted : found.converged ? FitStatus::converged : FitStatus::run_limit;
         fit.message = explain(fit.status);
         fill_parameters(fit, box, best.x, close ? close->in_box() : uncertainty);
         fit.message += uncertainty.message;
@@ -337,7 +335,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.distances = curve_distances(fit.residuals);
         fit.message += lack_of_fit(fit.checks) + model.remarks();
         if (by_walks) {
-            fit.message += fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ", 100 * model.resolution());
+            fit.message +=
+                fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ",
+                            100 * model.resolution());
         }
     }
     fill_runs(fit, box, objective.runs());

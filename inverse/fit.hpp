@@ -32,8 +32,8 @@ struct FitOptions {
     std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random
-    RunKeeping keeping;      // of the forward runs, as they end
-    Farm* farm = nullptr;    // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
+    RunKeeping keeping;                                 // of the forward runs, as they end
+    Farm* farm = nullptr;  // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
 
     /// Throws InputError naming the option that is out of range.
     void validate() const;
@@ -51,6 +51,7 @@ Fit fit_study(const Study& study, const FitOptions& options = {});
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop = nullptr);
 
 /// Their derivatives by the parameters. Absent where there are none, or a run failed.
-std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop = nullptr);
+std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values,
+                                          const std::atomic<bool>* stop = nullptr);
 
 }  // namespace crampfit

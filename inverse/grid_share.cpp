@@ -63,7 +63,8 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
     return StudyModel(wide, simulation, solver_resolution, stop).at(values, 1);
 }
 
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window) {
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about,
+                             const Window& window) {
     const Eigen::VectorXd values = model.box().values(best.x);
     Evaluation here = *best.evaluation;
     const std::vector<FitResidual> before = model.residuals(here);
@@ -90,7 +91,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     const Eigen::VectorXd shifts = box.values(x + left) - values;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         if (std::abs(shifts[j]) > farthest_told * size_of(box.parameters()[static_cast<std::size_t>(j)], values[j])) {
-            fit.message += "What the grid leaves is not told: a fit on cells twice as wide, which would tell it, goes too far off. ";
+            fit.message +=
+                "What the grid leaves is not told: a fit on cells twice as wide, which would tell it, goes too far off. ";
             return;
         }
     }
@@ -113,9 +115,10 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     }
     fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
-    fit.message += fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
-                               "Intervals take that in on its side; it makes up to {:.0f} % of a variance. ",
-                               fmt::join(told, ", "), 100 * most);
+    fit.message +=
+        fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
+                    "Intervals take that in on its side; it makes up to {:.0f} % of a variance. ",
+                    fmt::join(told, ", "), 100 * most);
 }
 
 }  // namespace crampfit

@@ -14,16 +14,18 @@ Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, 
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
 ///
-/// Cells twice as wide change the residuals by g (`wide`, usable, with the best point's values), and a fit there would have its best point
-/// off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh them (StudyModel::likely_resolution): else single
-/// stations beside a jump had the say. Of an error that the finer of two grids changes by m, 3 m / (2^2 - 1) may be left: the grid
-/// convergence index for two grids and a method of second order (Roache 1994, Perspective: a method for uniform reporting of grid
-/// refinement studies, J. Fluids Eng. 116), which takes in errors that go with the first power of the cell. The errors of both grids go
-/// the same way, so that it counts against m only. A scene that takes a third of the difference of both grids off has moved away from
-/// the wide one by four thirds of that difference: there three quarters of g count.
+/// Cells twice as wide change the residuals by g (`wide`, usable, with the best point's values), and a fit there would have its
+/// best point off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh them
+/// (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
+/// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,
+/// Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116), which takes in errors that go
+/// with the first power of the cell. The errors of both grids go the same way, so that it counts against m only. A scene that
+/// takes a third of the difference of both grids off has moved away from the wide one by four thirds of that difference: there
+/// three quarters of g count.
 ///
 /// `about` tells of the best point, seen in `window`.
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about, const Window& window);
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about,
+                             const Window& window);
 
 /// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
 /// as spread evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value or, on a

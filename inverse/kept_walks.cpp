@@ -122,8 +122,10 @@ class KeptWalks::Store {
     }
 
     bool has_slopes() const {
-        const bool of_wood = std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
-        return of_wood && std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
+        const bool of_wood =
+            std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
+        return of_wood &&
+               std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
     }
 
     bool depend_on_order() const {
@@ -309,11 +311,15 @@ Forward KeptWalks::in_any_order() const {
 bool KeptWalks::depend_on_order() const { return store_->depend_on_order(); }
 
 Forward KeptWalks::near(const std::vector<double>& values) const {
-    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, false, stop); };
+    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) {
+        return store->run_near(values, scene, false, stop);
+    };
 }
 
 Forward KeptWalks::rough(const std::vector<double>& values) const {
-    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) { return store->run_near(values, scene, true, stop); };
+    return [store = store_, values](const Scene& scene, const std::atomic<bool>* stop) {
+        return store->run_near(values, scene, true, stop);
+    };
 }
 
 void KeptWalks::put_off(const std::vector<double>& values, std::function<void()> work) const {

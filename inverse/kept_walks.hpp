@@ -7,9 +7,9 @@
 
 namespace crampfit {
 
-/// The forward solver as a fit calls it: runs that differ from a recent one by toughness alone share its equilibria, unless the crack
-/// turns by it (direction "energy release rate"). How a walk that they share is modelled (linear or not) follows from the parameters'
-/// initial toughnesses, whichever run comes first. All may be called from several threads.
+/// The forward solver as a fit calls it: runs that differ from a recent one by toughness alone share its equilibria, unless the
+/// crack turns by it (direction "energy release rate"). How a walk that they share is modelled (linear or not) follows from the
+/// parameters' initial toughnesses, whichever run comes first. All may be called from several threads.
 class KeptWalks {
   public:
     /// Each walk is solved with `threads` threads.
@@ -25,11 +25,13 @@ class KeptWalks {
     /// Whether runs on walks depend on the runs before, in their last digits.
     bool depend_on_order() const;
 
-    /// The simulation near a point of the study, `values` of its parameters, on the walk of that point and the way that the crack goes there:
-    /// exact for toughness, to first order for all other parameters, which takes milliseconds once that walk is there.
+    /// The simulation near a point of the study, `values` of its parameters, on the walk of that point and the way that the crack
+    /// goes there: exact for toughness, to first order for all other parameters, which takes milliseconds once that walk is
+    /// there.
     Forward near(const std::vector<double>& values) const;
 
-    /// The same from the equilibria that runs have left there, roughly where these lie apart: for a search, whose end `exact` confirms.
+    /// The same from the equilibria that runs have left there, roughly where these lie apart: for a search, whose end `exact`
+    /// confirms.
     Forward rough(const std::vector<double>& values) const;
 
     /// Puts off work on the walks of a point of the study until `catch_up` there: what another process has done before and need
@@ -51,8 +53,8 @@ class KeptWalks {
     /// Whether walks have derivatives by all other parameters.
     bool has_slopes() const;
 
-    /// Whether those, and small differences of toughness, are derivatives of all that a run gives: not where the parameters turn the
-    /// crack's way.
+    /// Whether those, and small differences of toughness, are derivatives of all that a run gives: not where the parameters turn
+    /// the crack's way.
     bool has_exact_slopes() const;
 
   private:

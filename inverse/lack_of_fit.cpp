@@ -47,15 +47,17 @@ std::string lack_of_fit(const std::vector<FitCheck>& checks) {
     for (const FitCheck& check : checks) {
         const std::string curve = fmt::format("{} of '{}'", check.kind, check.experiment);
         if (check.p_chi_square < rare) {
-            text += fmt::format("Lack of fit: the residuals of {} are {:.2g} times what the noise explains (chi-square test, p = {:.1g}). ",
-                                curve, std::sqrt(check.chi_square / check.points), check.p_chi_square);
+            text += fmt::format(
+                "Lack of fit: the residuals of {} are {:.2g} times what the noise explains (chi-square test, p = {:.1g}). ",
+                curve, std::sqrt(check.chi_square / check.points), check.p_chi_square);
         }
         // Far below the errors that were allowed for, residuals are the rounding of data or model.
         const bool is_small = check.chi_square < 0.01 * check.points;
         if (check.p_autocorrelation < rare && !is_small) {
-            text += fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}): the model, or "
-                                "its grid, misses something there. ",
-                                curve, check.autocorrelation, check.p_autocorrelation);
+            text +=
+                fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}): the model, or "
+                            "its grid, misses something there. ",
+                            curve, check.autocorrelation, check.p_autocorrelation);
         }
     }
     return text;

@@ -33,8 +33,7 @@ double slope(std::span<const double> at, std::span<const double> values) {
             powers(i, k) = std::pow(at[static_cast<std::size_t>(i)] / difference_step, static_cast<double>(k + 1));
         }
     }
-    const Eigen::VectorXd coefficients =
-        powers.partialPivLu().solve(Eigen::Map<const Eigen::VectorXd>(values.data(), count));
+    const Eigen::VectorXd coefficients = powers.partialPivLu().solve(Eigen::Map<const Eigen::VectorXd>(values.data(), count));
     return coefficients[0] / difference_step;
 }
 

@@ -68,9 +68,8 @@ std::optional<LocalModel> LocalModel::fit(const std::vector<Run>& near, const Ei
 
 std::optional<LocalModel> LocalModel::fit(std::span<const Run> runs, const Eigen::VectorXd& centre, double reach) {
     std::vector<Run> near;
-    std::copy_if(runs.begin(), runs.end(), std::back_inserter(near), [&](const Run& run) {
-        return run.evaluation->usable() && (run.x - centre).cwiseAbs().maxCoeff() <= reach;
-    });
+    std::copy_if(runs.begin(), runs.end(), std::back_inserter(near),
+                 [&](const Run& run) { return run.evaluation->usable() && (run.x - centre).cwiseAbs().maxCoeff() <= reach; });
     if (near.empty()) {
         return std::nullopt;
     }
@@ -84,9 +83,7 @@ std::optional<LocalModel> LocalModel::fit(std::span<const Run> runs, const Eigen
 
 Eigen::VectorXd LocalModel::residuals(const Eigen::VectorXd& x) const { return coefficients_.transpose() * terms(x); }
 
-Eigen::MatrixXd LocalModel::jacobian() const {
-    return coefficients_.middleRows(1, centre_.size()).transpose() / reach_;
-}
+Eigen::MatrixXd LocalModel::jacobian() const { return coefficients_.middleRows(1, centre_.size()).transpose() / reach_; }
 
 Eigen::VectorXd lowest_point(const LocalModel& model, const Eigen::VectorXd& centre, double radius) {
     const Eigen::VectorXd low = (centre.array() - radius).cwiseMax(0.0);

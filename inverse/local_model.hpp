@@ -34,8 +34,7 @@ class LocalModel {
   private:
     enum class Order { linear, squares, full };
 
-    static std::optional<LocalModel> fit(const std::vector<Run>& near, const Eigen::VectorXd& centre, double reach,
-                                         Order order);
+    static std::optional<LocalModel> fit(const std::vector<Run>& near, const Eigen::VectorXd& centre, double reach, Order order);
     Eigen::VectorXd terms(const Eigen::VectorXd& x) const;
 
     Order order_ = Order::linear;

@@ -10,9 +10,9 @@ namespace {
 // What the row between two others would be.
 Instant between(const Instant& a, const Instant& b, double s) {
     Instant row = a;
-    for (double Instant::*number :
-         {&Instant::time, &Instant::displacement, &Instant::force, &Instant::crack_length, &Instant::G, &Instant::K_I, &Instant::K_II,
-          &Instant::strain_energy, &Instant::kinetic_energy, &Instant::fracture_energy, &Instant::external_work}) {
+    for (double Instant::*number : {&Instant::time, &Instant::displacement, &Instant::force, &Instant::crack_length, &Instant::G,
+                                    &Instant::K_I, &Instant::K_II, &Instant::strain_energy, &Instant::kinetic_energy,
+                                    &Instant::fracture_energy, &Instant::external_work}) {
         row.*number = std::lerp(a.*number, b.*number, s);
     }
     row.tip = a.tip + s * (b.tip - a.tip);
@@ -24,7 +24,8 @@ Instant between(const Instant& a, const Instant& b, double s) {
 Record as_recorded(const Record& record, const Machine& machine) {
     Record result = record;
     for (Frame& frame : result.frames) {
-        const auto row = std::find_if(record.series.begin(), record.series.end() - 1, [&](const Instant& i) { return i.time >= frame.time; });
+        const auto row =
+            std::find_if(record.series.begin(), record.series.end() - 1, [&](const Instant& i) { return i.time >= frame.time; });
         frame.displacement += machine.compliance * row->force + machine.displacement_offset;
     }
     result.series.clear();
@@ -38,7 +39,8 @@ Record as_recorded(const Record& record, const Machine& machine) {
         row.force += machine.force_offset;
         if (row.displacement >= reached) {
             if (behind && row.displacement > before.displacement) {
-                result.series.push_back(between(before, row, (reached - before.displacement) / (row.displacement - before.displacement)));
+                result.series.push_back(
+                    between(before, row, (reached - before.displacement) / (row.displacement - before.displacement)));
             }
             result.series.push_back(row);
             reached = row.displacement;

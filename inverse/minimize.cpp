@@ -16,8 +16,7 @@ Solution minimize(Objective& objective, const Eigen::VectorXd& start, const Meth
     if (method.name == "auto") {
         return minimize_on_models(objective, start);
     }
-    return method.name == "ceres" ? minimize_with_ceres(objective, start)
-                                  : minimize_with_nlopt(objective, start, method);
+    return method.name == "ceres" ? minimize_with_ceres(objective, start) : minimize_with_nlopt(objective, start, method);
 }
 
 }  // namespace crampfit

@@ -69,8 +69,7 @@ Solution minimize_on_models(Objective& objective, const Eigen::VectorXd& start) 
                 continue;
             }
             if (!in_a_hollow(objective, best)) {
-                return {true, promising ? "the noise of the model hides any further gain"
-                                        : "no step promises a smaller misfit"};
+                return {true, promising ? "the noise of the model hides any further gain" : "no step promises a smaller misfit"};
             }
             radius = first_radius;
             stalls = 0;

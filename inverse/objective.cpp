@@ -93,9 +93,7 @@ std::vector<std::shared_ptr<const Evaluation>> Objective::at(std::span<const Eig
     return found;
 }
 
-std::shared_ptr<const Evaluation> Objective::at(const Eigen::VectorXd& point) {
-    return at(std::span(&point, 1)).front();
-}
+std::shared_ptr<const Evaluation> Objective::at(const Eigen::VectorXd& point) { return at(std::span(&point, 1)).front(); }
 
 Objective Objective::branch(int budget, int threads) const {
     Objective result = *this;

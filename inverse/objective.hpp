@@ -40,8 +40,8 @@ class Objective {
     using OnRun = std::function<void(const Run&)>;
 
     /// `on_run` is called once after each run, one call at a time; it may be empty. `stop` may be null.
-    Objective(Eigen::Index parameters, Evaluate evaluate, int budget, int threads,
-              const std::atomic<bool>* stop = nullptr, OnRun on_run = {});
+    Objective(Eigen::Index parameters, Evaluate evaluate, int budget, int threads, const std::atomic<bool>* stop = nullptr,
+              OnRun on_run = {});
 
     /// Evaluates points side by side. A point that was not run, for lack of budget or because of a stop, gives a null.
     std::vector<std::shared_ptr<const Evaluation>> at(std::span<const Eigen::VectorXd> points);
@@ -52,8 +52,8 @@ class Objective {
     Objective branch(int budget, int threads) const;
     void join(const Objective& branch);
 
-    /// Puts what `judge` makes of each run in the place of what it was. Not while branches are at work; those made before keep what
-    /// they have.
+    /// Puts what `judge` makes of each run in the place of what it was. Not while branches are at work; those made before keep
+    /// what they have.
     void judge_anew(const std::function<Evaluation(const Run&)>& judge);
 
     Eigen::Index parameters() const { return parameters_; }

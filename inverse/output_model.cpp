@@ -18,7 +18,8 @@ OutputModel::OutputModel(const Study& study, Forward forward, const std::atomic<
     : study_(checked(study)), runs_(study, std::move(forward), stop), box_(study.parameters) {
     for (std::size_t i = 0; i < runs_.size(); ++i) {
         for (const StudyOutput& output : study.outputs) {
-            names_.push_back({runs_.size() > 1 ? study.experiments[i].name + ": " + output.name : output.name, unit_of(output.kind)});
+            names_.push_back(
+                {runs_.size() > 1 ? study.experiments[i].name + ": " + output.name : output.name, unit_of(output.kind)});
         }
     }
 }

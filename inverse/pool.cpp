@@ -9,9 +9,7 @@
 
 namespace crampfit {
 
-int thread_count(int asked) {
-    return asked > 0 ? asked : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
+int thread_count(int asked) { return asked > 0 ? asked : std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 void parallel_for(int count, int threads, const std::function<void(int)>& job) {
     std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count));

@@ -9,11 +9,11 @@
 namespace crampfit {
 namespace {
 
-constexpr int most_steps = 24;            // on a side
-constexpr double least_step = 0.002;      // of the box: below it, a run's own noise is all there is
-constexpr double largest_step = 0.1;      // of the box
-constexpr int runs_of_a_descent = 60;     // for each of the others
-constexpr int runs_across_kinks = 30;     // the same
+constexpr int most_steps = 24;         // on a side
+constexpr double least_step = 0.002;   // of the box: below it, a run's own noise is all there is
+constexpr double largest_step = 0.1;   // of the box
+constexpr int runs_of_a_descent = 60;  // for each of the others
+constexpr int runs_across_kinks = 30;  // the same
 
 // x with its coordinate j left out, or put in.
 Eigen::VectorXd without(const Eigen::VectorXd& x, Eigen::Index j) {
@@ -95,7 +95,8 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
 std::pair<double, double> interval(const Profile& profile, double least, double rise) {
     const double level = std::sqrt(rise);
     const auto height = [&](std::size_t i) { return std::sqrt(std::max(0.0, profile.misfit[i] - least)); };
-    const auto lowest = static_cast<std::size_t>(std::min_element(profile.misfit.begin(), profile.misfit.end()) - profile.misfit.begin());
+    const auto lowest =
+        static_cast<std::size_t>(std::min_element(profile.misfit.begin(), profile.misfit.end()) - profile.misfit.begin());
     const auto crossing = [&](std::size_t in, std::size_t out) {
         return std::lerp(profile.x[in], profile.x[out], (level - height(in)) / (height(out) - height(in)));
     };

@@ -17,10 +17,10 @@ struct Profile {
     std::vector<double> misfit;  // least sum of squares there
 };
 
-/// The profile of parameter j about the best run, outwards in steps of about half a `standard_error` until the misfit has risen by
-/// `rise` or the bound is reached. Each point takes a descent of the others from where the one before ended; a point at which all
-/// runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence intervals,
-/// Applied Statistics 37.
+/// The profile of parameter j about the best run, outwards in steps of about half a `standard_error` until the misfit has risen
+/// by `rise` or the bound is reached. Each point takes a descent of the others from where the one before ended; a point at which
+/// all runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence
+/// intervals, Applied Statistics 37.
 Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double standard_error, double rise);
 
 /// Where the profile comes up to `rise` above `least` below and above its lowest point: between two of its points as the square
@@ -28,8 +28,8 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
 std::pair<double, double> interval(const Profile& profile, double least, double rise);
 
 /// Where the profile of parameter j comes up to `rise` above `least` on one side of the best run, `side` -1 or 1: how far off, as
-/// a parabola has it or farther. Looked for from the parabola's end, `distance` along its `valley` [parameters], valley_j = 1, and
-/// not followed from the best run on. Absent where it does not come up within the cube, or no run was usable.
+/// a parabola has it or farther. Looked for from the parabola's end, `distance` along its `valley` [parameters], valley_j = 1,
+/// and not followed from the best run on. Absent where it does not come up within the cube, or no run was usable.
 std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
                                   const Eigen::VectorXd& valley, double least, double rise);
 

@@ -12,8 +12,7 @@
 namespace crampfit {
 namespace {
 
-constexpr double noise_floor =
-    0.002;  // of a curve's range: a good load cell or ruler, when nothing was said about noise
+constexpr double noise_floor = 0.002;      // of a curve's range: a good load cell or ruler, when nothing was said about noise
 constexpr double near_stations = 0.25e-3;  // least and largest growth between arrival stations [m]
 constexpr double far_stations = 0.5e-3;
 constexpr double rows_in_a_window = 2;  // of crack length, at least, where it is averaged
@@ -26,10 +25,8 @@ bool measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
 }
 
-InputError bad_data(const Experiment& experiment, const std::string& key, const std::string& value,
-                    const std::string& rule) {
-    const std::string file =
-        experiment.data_file.empty() ? "experiment " + experiment.name : experiment.data_file.string();
+InputError bad_data(const Experiment& experiment, const std::string& key, const std::string& value, const std::string& rule) {
+    const std::string file = experiment.data_file.empty() ? "experiment " + experiment.name : experiment.data_file.string();
     return InputError(file, key, value, rule);
 }
 
@@ -47,9 +44,8 @@ void check_rises(const Experiment& experiment, const std::vector<double>& abscis
         throw bad_data(experiment, column, fmt::format("{:g}", low), "must rise through the test, and stands still");
     }
     if (fall > 0.05 * (high - low)) {
-        throw bad_data(
-            experiment, column, fmt::format("{:g} after {:g}", high - fall, high),
-            "must rise through the test, and falls by more than a twentieth of its range; fit a part that rises");
+        throw bad_data(experiment, column, fmt::format("{:g} after {:g}", high - fall, high),
+                       "must rise through the test, and falls by more than a twentieth of its range; fit a part that rises");
     }
 }
 
@@ -153,12 +149,10 @@ void Comparison::add_curves(const Experiment& experiment) {
     const Curves& data = experiment.data;
     by_time_ = !measured(data.displacement);
     if (by_time_ && !measured(data.time)) {
-        throw bad_data(experiment, "displacement", "absent",
-                       "a displacement or a time column is needed to compare a model with");
+        throw bad_data(experiment, "displacement", "absent", "a displacement or a time column is needed to compare a model with");
     }
     if (!measured(data.force) && !measured(data.crack_length)) {
-        throw bad_data(experiment, "force", "absent",
-                       "a force or a crack_length column is needed to compare a model with");
+        throw bad_data(experiment, "force", "absent", "a force or a crack_length column is needed to compare a model with");
     }
     abscissa_ = by_time_ ? data.time : data.displacement;
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
@@ -183,9 +177,8 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
         throw bad_data(experiment, what, "0", "is zero throughout; its noise must be given");
     }
     const bool force = std::string(what) == "force";
-    remarks_.push_back(
-        fmt::format("{}: the noise of {} was not given; {:.3g} {} was estimated from the scatter of the rows.",
-                    experiment.name, what, force ? sigma : 1e3 * sigma, force ? "N" : "mm"));
+    remarks_.push_back(fmt::format("{}: the noise of {} was not given; {:.3g} {} was estimated from the scatter of the rows.",
+                                   experiment.name, what, force ? sigma : 1e3 * sigma, force ? "N" : "mm"));
     return sigma;
 }
 
@@ -271,8 +264,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     const double longest = std::max(rows.mean(to - arrival_window_, to), rows.y().back() - 3 * noise);
     const double growth = longest - shortest;
     if (!(growth > 3 * noise)) {
-        remarks_.push_back(experiment.name +
-                           ": the crack did not grow by more than its noise; crack_length is not used.");
+        remarks_.push_back(experiment.name + ": the crack did not grow by more than its noise; crack_length is not used.");
         return;
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
@@ -335,8 +327,8 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
     // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
     const double end = *std::max_element(abscissa.begin(), abscissa.end());
     const std::size_t rows = abscissa.size();
-    const bool ends_with_jump = rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-8 * end &&
-                                lengths[rows - 1] > lengths[rows - 2];
+    const bool ends_with_jump =
+        rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-8 * end && lengths[rows - 1] > lengths[rows - 2];
     if (ends_with_jump && end < arrival_end_) {
         abscissa.push_back(arrival_end_);
         lengths.push_back(lengths.back());

@@ -59,8 +59,7 @@ class Comparison {
     std::vector<double> on_curves(const Record& record, double slack_force) const;
     void add_force_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment);
-    double noise_of(const Experiment& experiment, const char* what, const Curve& rows,
-                    const std::optional<double>& given);
+    double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
     double force_at(const Curve& force, double at) const;
     double shift_error(const Curve& force, double at, double sigma) const;
     double sampling_error(const Curve& rows, double at, double usual) const;

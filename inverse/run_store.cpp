@@ -15,7 +15,8 @@ namespace {
 // Of the journal's entries that hold what a search has found; parameters are its number and, by its bits, what it was asked.
 const char* const search_status = "search";
 
-template <class T> std::string_view bytes_of(const std::vector<T>& values) {
+template <class T>
+std::string_view bytes_of(const std::vector<T>& values) {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
 }
 

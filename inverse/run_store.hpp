@@ -17,7 +17,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-#include <vector>
 
 namespace crampfit {
 

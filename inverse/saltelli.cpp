@@ -36,7 +36,8 @@ struct Rows {
 };
 
 // Sum over rows of a product, over the variance of all that A and B hold. Table 2 of Saltelli et al. (2010).
-template <class Term> double part_of_variance(const Rows& rows, std::span<const int> drawn, const Term& term) {
+template <class Term>
+double part_of_variance(const Rows& rows, std::span<const int> drawn, const Term& term) {
     double sum = 0, sum_of_squares = 0, sum_of_terms = 0;
     for (const int row : drawn) {
         const auto i = static_cast<std::size_t>(row);
@@ -80,12 +81,12 @@ SaltelliDesign::Indices SaltelliDesign::indices(std::span<const double> values) 
             }
         }
         rows.take_off_mean();
-        const auto first = [](double a, double b, double ab) { return b * (ab - a); };              // (b)
+        const auto first = [](double a, double b, double ab) { return b * (ab - a); };             // (b)
         const auto total = [](double a, double, double ab) { return 0.5 * (a - ab) * (a - ab); };  // (f), Jansen (1999)
-        indices.first.push_back(bootstrap(
-            rows.size(), seed_, [&](std::span<const int> drawn) { return part_of_variance(rows, drawn, first); }));
-        indices.total.push_back(bootstrap(
-            rows.size(), seed_, [&](std::span<const int> drawn) { return part_of_variance(rows, drawn, total); }));
+        indices.first.push_back(
+            bootstrap(rows.size(), seed_, [&](std::span<const int> drawn) { return part_of_variance(rows, drawn, first); }));
+        indices.total.push_back(
+            bootstrap(rows.size(), seed_, [&](std::span<const int> drawn) { return part_of_variance(rows, drawn, total); }));
     }
     return indices;
 }

@@ -63,8 +63,8 @@ struct SceneRuns::Kept {
 };
 
 SceneRuns::SceneRuns(const Study& study, Forward forward, const std::atomic<bool>* stop)
-    : scenes_(scenes_of(study)), machines_(scenes_.size()), forward_(std::move(forward)), stop_(stop), time_limit_(study.time_limit),
-      settings_(scenes_.size()), kept_(std::make_shared<Kept>()) {
+    : scenes_(scenes_of(study)), machines_(scenes_.size()), forward_(std::move(forward)), stop_(stop),
+      time_limit_(study.time_limit), settings_(scenes_.size()), kept_(std::make_shared<Kept>()) {
     kept_->of_scene.resize(scenes_.size());
     for (std::size_t i = 0; i < study.experiments.size(); ++i) {
         machines_[i] = study.experiments[i].machine;
@@ -163,7 +163,7 @@ SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const std::vector<do
         } else if (!finite(record)) {
             outcome.status += ": the run gave numbers that are not finite";
         } else if (!ended) {
-            outcome.status += limit.passed()          ? fmt::format(": longer than runs.time_limit = {:g} s", *time_limit_)
+            outcome.status += limit.passed()           ? fmt::format(": longer than runs.time_limit = {:g} s", *time_limit_)
                               : record.message.empty() ? ""
                                                        : ": " + record.message;
         } else {

@@ -13,8 +13,8 @@
 
 namespace crampfit {
 
-/// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes but
-/// the machine that it is tested on, or another scene: the last records of each are kept.
+/// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes
+/// but the machine that it is tested on, or another scene: the last records of each are kept.
 class SceneRuns {
   public:
     /// Throws InputError for a key that no scene has. The study must outlive this; `stop` may be null.
@@ -36,8 +36,8 @@ class SceneRuns {
     struct Setting {
         Eigen::Index parameter;
         double factor;
-        std::string key;                               // of the scene
-        const MachineNumber* of_machine = nullptr;     // instead of a key
+        std::string key;                            // of the scene
+        const MachineNumber* of_machine = nullptr;  // instead of a key
     };
     struct Kept;
 
@@ -48,7 +48,7 @@ class SceneRuns {
     std::vector<Machine> machines_;  // of the experiments; none for a scene alone
     Forward forward_;
     const std::atomic<bool>* stop_;
-    std::optional<double> time_limit_;  // [s]
+    std::optional<double> time_limit_;            // [s]
     std::vector<std::vector<Setting>> settings_;  // of each scene
     std::shared_ptr<Kept> kept_;
 };

@@ -40,7 +40,8 @@ void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, uns
 // Methods that lead a polynomial through the misfits of single runs take what stands for a failed one for the misfit there.
 bool is_misled(const Objective& objective, const Method& method) {
     return (method.name == "bobyqa" || method.name == "cobyla") &&
-           std::any_of(objective.runs().begin(), objective.runs().end(), [](const Run& run) { return !run.evaluation->usable(); });
+           std::any_of(objective.runs().begin(), objective.runs().end(),
+                       [](const Run& run) { return !run.evaluation->usable(); });
 }
 
 // Where failed runs end a method before its time or mislead it, a simplex method that only compares misfits goes on from the best
@@ -66,9 +67,8 @@ std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const 
     constexpr double far = 0.2;  // of the box
     const Run* next = nullptr;
     for (const Run& run : starts) {
-        const bool is_new = std::none_of(seen.begin(), seen.end(), [&](const Eigen::VectorXd& x) {
-            return (x - run.x).cwiseAbs().maxCoeff() < far;
-        });
+        const bool is_new = std::none_of(seen.begin(), seen.end(),
+                                         [&](const Eigen::VectorXd& x) { return (x - run.x).cwiseAbs().maxCoeff() < far; });
         if (is_new && run.evaluation->usable() && (!next || run.evaluation->misfit < next->evaluation->misfit)) {
             next = &run;
         }

@@ -75,7 +75,8 @@ void add_local(Indices& indices, std::size_t output, const UnitBox& box, const s
 }
 
 // By differences of whole runs.
-void add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design, const std::vector<double>& values) {
+void add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design,
+                     const std::vector<double>& values) {
     const Eigen::VectorXd& x = design.points().front();
     std::vector<double> to_si;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
@@ -103,9 +104,10 @@ std::optional<WalkSlopes> slopes_at(const Study& study, const KeptWalks& walks, 
 
 using Slopes = std::function<std::optional<WalkSlopes>()>;
 
-// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where the
-// solver has none.
-void apply_method(const Study& study, const UnitBox& box, Objective& objective, const Slopes& slopes, unsigned seed, Sensitivity& result) {
+// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where
+// the solver has none.
+void apply_method(const Study& study, const UnitBox& box, Objective& objective, const Slopes& slopes, unsigned seed,
+                  Sensitivity& result) {
     const int samples = study.sensitivity.samples;
     Indices indices(result, study.sensitivity.method);
     const auto for_each_output = [&](const std::vector<Eigen::VectorXd>& points, const auto& add) {
@@ -204,13 +206,13 @@ void conclude(const std::vector<Run>& runs, bool stopped, Sensitivity& result) {
     result.message = fmt::format("{} runs ended well", good);
     if (failed > 0) {
         const auto first = std::find_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
-        result.message += fmt::format("; {} of {} runs failed and are left out; the first: {}", failed, runs.size(),
-                                      first->evaluation->status);
+        result.message +=
+            fmt::format("; {} of {} runs failed and are left out; the first: {}", failed, runs.size(), first->evaluation->status);
     }
     for (std::size_t k = 0; k < result.outputs.size() && good > 0; ++k) {
-        const auto without = std::count_if(result.runs.begin(), result.runs.end(), [&](const SensitivityRun& run) {
-            return std::isnan(run.outputs[k]);
-        }) - failed;
+        const auto without = std::count_if(result.runs.begin(), result.runs.end(),
+                                           [&](const SensitivityRun& run) { return std::isnan(run.outputs[k]); }) -
+                             failed;
         if (without > 0) {
             result.message += fmt::format("; {} runs have no '{}' and are left out there", without, result.outputs[k].name);
         }
@@ -248,8 +250,8 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
 
     SensitivityProgress progress;
     progress.planned = runs_of(study, slopes != nullptr);
-    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); }, threads,
-                   in_order ? nullptr : options.farm);
+    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); },
+                   threads, in_order ? nullptr : options.farm);
     RunStore store(options.keeping, study, options.stop_requested);
     Objective objective(
         model.box().size(),
@@ -257,7 +259,8 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
             const Eigen::VectorXd values = model.box().values(x);
             return store.at(values, [&] { return shared(values, share); });
         },
-        progress.planned, in_order ? 1 : shared.places(), options.stop_requested, [&](const Run& run) {
+        progress.planned, in_order ? 1 : shared.places(), options.stop_requested,
+        [&](const Run& run) {
             ++progress.runs;
             progress.failed += run.evaluation->usable() ? 0 : 1;
             progress.failure = failure_text(study, model.box().values(run.x), *run.evaluation);

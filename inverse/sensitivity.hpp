@@ -13,19 +13,19 @@
 namespace crampfit {
 
 struct SensitivityProgress {
-    int runs = 0;    // forward runs that have ended
+    int runs = 0;  // forward runs that have ended
     int planned = 0;
     int failed = 0;
     std::string failure;  // why the run that has just ended failed, and the command that runs it again; empty: it did not
 };
 
 struct SensitivityOptions {
-    int threads = 0;                                            // forward runs side by side; 0: one a core
-    Forward forward;                                            // empty: crampfit::simulate
-    std::function<void(const SensitivityProgress&)> progress;   // after every forward run, one call at a time; may be empty
-    const std::atomic<bool>* stop_requested = nullptr;          // set from outside: the study ends with what it has
-    unsigned seed = 1;                                          // of everything that is drawn at random
-    RunKeeping keeping;    // of the forward runs, as they end
+    int threads = 0;                                           // forward runs side by side; 0: one a core
+    Forward forward;                                           // empty: crampfit::simulate
+    std::function<void(const SensitivityProgress&)> progress;  // after every forward run, one call at a time; may be empty
+    const std::atomic<bool>* stop_requested = nullptr;         // set from outside: the study ends with what it has
+    unsigned seed = 1;                                         // of everything that is drawn at random
+    RunKeeping keeping;                                        // of the forward runs, as they end
     Farm* farm = nullptr;  // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
 
     /// Throws InputError naming the option that is out of range.
@@ -44,6 +44,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
 StudyFunction output_function(const Study& study, const std::atomic<bool>* stop = nullptr);
 
 /// Their derivatives by the parameters. Absent where there are none, or a run failed.
-std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop = nullptr);
+std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values,
+                                             const std::atomic<bool>* stop = nullptr);
 
 }  // namespace crampfit

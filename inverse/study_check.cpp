@@ -12,8 +12,7 @@
 namespace crampfit {
 namespace {
 
-void require(bool holds, const Study& study, const std::string& key, const std::string& value,
-             const std::string& rule) {
+void require(bool holds, const Study& study, const std::string& key, const std::string& value, const std::string& rule) {
     if (!holds) {
         throw InputError(study.file.empty() ? "study" : study.file.string(), key, value, rule);
     }
@@ -28,8 +27,7 @@ void check_parameter(const Study& study, const Parameter& p, std::size_t index) 
             "must be above lower = " + text(p.lower));
     require(p.initial >= p.lower && p.initial <= p.upper, study, at + "initial", text(p.initial),
             fmt::format("must lie between lower = {:g} and upper = {:g}", p.lower, p.upper));
-    require(p.scale == Scale::linear || p.lower > 0, study, at + "lower", text(p.lower),
-            "must be positive on a log scale");
+    require(p.scale == Scale::linear || p.lower > 0, study, at + "lower", text(p.lower), "must be positive on a log scale");
     require(!p.prior || p.prior->sd > 0, study, at + "prior.sd", p.prior ? text(p.prior->sd) : "", "must be positive");
 }
 
@@ -62,13 +60,12 @@ void check_study(const Study& study) {
     }
     const OptimizerChoice& optimizer = study.optimizer;
     const auto& names = method_names();
-    require(std::find(names.begin(), names.end(), optimizer.method) != names.end(), study, "optimizer.method",
-            optimizer.method, fmt::format("must be one of {}", fmt::join(names, ", ")));
+    require(std::find(names.begin(), names.end(), optimizer.method) != names.end(), study, "optimizer.method", optimizer.method,
+            fmt::format("must be one of {}", fmt::join(names, ", ")));
     require(optimizer.starts >= 1, study, "optimizer.starts", std::to_string(optimizer.starts), "must be at least 1");
-    require(optimizer.max_runs >= 1, study, "optimizer.max_runs", std::to_string(optimizer.max_runs),
-            "must be at least 1");
-    require(study.uncertainty.posterior >= 0, study, "uncertainty.posterior",
-            std::to_string(study.uncertainty.posterior), "must not be negative");
+    require(optimizer.max_runs >= 1, study, "optimizer.max_runs", std::to_string(optimizer.max_runs), "must be at least 1");
+    require(study.uncertainty.posterior >= 0, study, "uncertainty.posterior", std::to_string(study.uncertainty.posterior),
+            "must not be negative");
 }
 
 void check_sensitivity_study(const Study& study) {

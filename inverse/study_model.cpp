@@ -18,8 +18,8 @@ const Study& checked(const Study& study) {
     return study;
 }
 
-// The number whose square is the loss of r, with the sign of r. The bends are those at which a fit to normal noise has 95 % of the
-// efficiency of least squares (Holland and Welsch 1977, table 1).
+// The number whose square is the loss of r, with the sign of r. The bends are those at which a fit to normal noise has 95 % of
+// the efficiency of least squares (Holland and Welsch 1977, table 1).
 double softened(double r, Loss loss) {
     constexpr double huber = 1.345, cauchy = 2.385;
     switch (loss) {
@@ -36,16 +36,16 @@ double softened(double r, Loss loss) {
 }  // namespace
 
 StudyModel::StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop)
-    : study_(checked(study)), resolution_(model_resolution), box_(study.parameters), comparisons_(comparisons_at(model_resolution)),
-      runs_(study, std::move(forward), stop) {
+    : study_(checked(study)), resolution_(model_resolution), box_(study.parameters),
+      comparisons_(comparisons_at(model_resolution)), runs_(study, std::move(forward), stop) {
     std::size_t stations = 0;
     for (const Comparison& comparison : comparisons_) {
         stations += comparison.stations().size();
     }
     if (stations < study.parameters.size()) {
-        throw InputError(
-            study.file.empty() ? "study" : study.file.string(), "parameters", std::to_string(study.parameters.size()),
-            "must be no more than the points to compare, of which the data gives " + std::to_string(stations));
+        throw InputError(study.file.empty() ? "study" : study.file.string(), "parameters",
+                         std::to_string(study.parameters.size()),
+                         "must be no more than the points to compare, of which the data gives " + std::to_string(stations));
     }
 }
 
@@ -78,7 +78,7 @@ double StudyModel::likely_resolution(const Evaluation& evaluation, double most) 
     constexpr int steps = 40;
     const auto rows = static_cast<double>(evaluation.modelled.size());
     const double share = 1.0 - static_cast<double>(box_.size()) / rows;  // of the rows that the fit leaves free
-    const auto deviance = [&](double resolution) {  // -2 ln L
+    const auto deviance = [&](double resolution) {                       // -2 ln L
         double sum = 0;
         Eigen::Index row = 0;
         for (std::size_t i = 0; i < comparisons_.size(); ++i) {
@@ -146,7 +146,8 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
     for (std::size_t i = 0; i < comparisons_.size(); ++i) {
         const double weight = std::sqrt(study_.experiments[i].weight);
         for (const FitResidual& station : comparisons_[i].stations()) {
-            residuals.push_back(weight * softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss));
+            residuals.push_back(weight *
+                                softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss));
         }
     }
     for (Eigen::Index j = 0; j < box_.size(); ++j) {

@@ -12,9 +12,9 @@
 
 namespace crampfit {
 
-// Displacements at which a crack moves differ by up to this much from grid to grid: in explicit dynamics for vibration and for arrests
-// between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on
-// cells of 0.1 and 0.05 mm: 1.184 and 1.181 mm, single states by more). How much of it a fit needs, its residuals tell.
+// Displacements at which a crack moves differ by up to this much from grid to grid: in explicit dynamics for vibration and for
+// arrests between cells, at equilibrium for the second-order error that is left after extrapolation (wedge sample on cells of 0.1
+// and 0.05 mm: 1.184 and 1.181 mm, single states by more). How much of it a fit needs, its residuals tell.
 inline constexpr double solver_resolution = 0.02;
 
 /// A study made ready to be run at any point of its unit cube: one Comparison an experiment.
@@ -41,9 +41,9 @@ class StudyModel {
     /// The most by which another resolution would change the sigma of a measurement, as a part of it.
     double change_of_sigma(double resolution) const;
 
-    /// The resolution up to `most` that makes a usable evaluation's residuals most likely: what they have beyond the data's noise is the
-    /// model's. Maximum likelihood of a component of variance, `parameters` degrees of freedom being the fit's (Harville 1977, Maximum
-    /// likelihood approaches to variance component estimation, J. Am. Stat. Assoc. 72).
+    /// The resolution up to `most` that makes a usable evaluation's residuals most likely: what they have beyond the data's noise
+    /// is the model's. Maximum likelihood of a component of variance, `parameters` degrees of freedom being the fit's (Harville
+    /// 1977, Maximum likelihood approaches to variance component estimation, J. Am. Stat. Assoc. 72).
     double likely_resolution(const Evaluation& evaluation, double most) const;
 
     const UnitBox& box() const { return box_; }

@@ -51,9 +51,8 @@ class Undetermined {
                 is_member_[j] = true;
             }
         }
-        message_ += members.size() == 1
-                        ? members.front() + " cannot be told from this data. "
-                        : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
+        message_ += members.size() == 1 ? members.front() + " cannot be told from this data. "
+                                        : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
     }
 
     bool contains(Eigen::Index j) const { return is_member_[static_cast<std::size_t>(j)]; }
@@ -142,8 +141,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.upper_95 = Eigen::VectorXd::Ones(p);
     if (!directions) {
         result.covariance = Eigen::MatrixXd::Identity(p, p) / 12.0;
-        result.message =
-            "Too few runs ended well near the best one to tell how sure it is: the intervals are the whole box. ";
+        result.message = "Too few runs ended well near the best one to tell how sure it is: the intervals are the whole box. ";
         return result;
     }
     const double time = correlation_time(residuals, curve_lengths);
@@ -167,10 +165,9 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.message += result.untold;
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
     if (share > 0.1) {
-        result.message +=
-            fmt::format("The model's own scatter from run to run, and the best run's distance from the lowest "
-                        "point of the fit through its neighbours, make up to {:.0f} % of a variance. ",
-                        100 * share);
+        result.message += fmt::format("The model's own scatter from run to run, and the best run's distance from the lowest "
+                                      "point of the fit through its neighbours, make up to {:.0f} % of a variance. ",
+                                      100 * share);
     }
     const double t = student_975(std::max(1, independent - p));
     result.quantile = t;

@@ -14,7 +14,8 @@ double UnitBox::value(Eigen::Index j, double x) const {
 
 double UnitBox::share(Eigen::Index j, double value) const {
     const Parameter& p = parameter(j);
-    return p.scale == Scale::logarithmic ? std::log(value / p.lower) / std::log(p.upper / p.lower) : (value - p.lower) / (p.upper - p.lower);
+    return p.scale == Scale::logarithmic ? std::log(value / p.lower) / std::log(p.upper / p.lower)
+                                         : (value - p.lower) / (p.upper - p.lower);
 }
 
 double UnitBox::slope(Eigen::Index j, double x) const {

@@ -17,9 +17,9 @@ class UnitBox {
     Eigen::Index size() const { return static_cast<Eigen::Index>(parameters_.size()); }
     const std::vector<Parameter>& parameters() const { return parameters_; }
 
-    double value(Eigen::Index j, double x) const;  // SI, never outside the bounds
+    double value(Eigen::Index j, double x) const;      // SI, never outside the bounds
     double share(Eigen::Index j, double value) const;  // and back: x of an SI value
-    double slope(Eigen::Index j, double x) const;  // dp/dx, SI
+    double slope(Eigen::Index j, double x) const;      // dp/dx, SI
     Eigen::VectorXd values(const Eigen::VectorXd& x) const;
     Eigen::VectorXd initial() const;  // in the unit cube
 

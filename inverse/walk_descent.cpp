@@ -19,14 +19,14 @@ constexpr double first_radius = 0.2;
 constexpr double reach_where_exact = 5.0;  // radii
 constexpr double last_radius = 0.03;
 constexpr double least_radius = 1e-4;
-constexpr double least_gain = 3e-3;  // of the misfit: with a misfit of tens, far less than one standard error
-constexpr double least_rise = 0.05;  // of the misfit, where noise is in it: a quarter of a standard error
+constexpr double least_gain = 3e-3;     // of the misfit: with a misfit of tens, far less than one standard error
+constexpr double least_rise = 0.05;     // of the misfit, where noise is in it: a quarter of a standard error
 constexpr double free_of_noise = 0.01;  // of the misfit for each residual: below that it is rounding of data or model
 constexpr int most_unconfirmed = 2;  // steps within the last radius whose gain no run confirms: what is left is the model's noise
 
 constexpr int points_a_parameter = 12;  // of a spread
-constexpr int model_starts = 16;     // for each parameter: of the cheap model, in its window
-constexpr int model_descents = 4;    // from the lowest of them
+constexpr int model_starts = 16;        // for each parameter: of the cheap model, in its window
+constexpr int model_descents = 4;       // from the lowest of them
 constexpr int runs_across_jumps = 200;  // for each parameter
 constexpr int most_polishing_steps = 15;
 constexpr double polishing_difference = 1e-5;
@@ -88,11 +88,13 @@ Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eige
     starts.front() = window.share(centre);
     cheap.at(starts);
     std::vector<Run> order = cheap.runs();
-    std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
+    std::stable_sort(order.begin(), order.end(),
+                     [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
     for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
         polish(cheap, order[static_cast<std::size_t>(i)].x);
     }
-    if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes its shape
+    if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes
+                         // its shape
         Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), threads);
         minimize(branch, cheap.best()->x, {"crs2", seed});
         cheap.join(branch);
@@ -179,7 +181,8 @@ bool is_explained(const Evaluation& best, Eigen::Index parameters) {
 // From the initial values and Sobol points of the box one step each, along the way that the crack goes there; the lowest first.
 std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& initial,
                                               unsigned seed) {
-    std::vector<Eigen::VectorXd> starts = sobol_points(starts_a_parameter * static_cast<int>(initial.size()), initial.size(), seed);
+    std::vector<Eigen::VectorXd> starts =
+        sobol_points(starts_a_parameter * static_cast<int>(initial.size()), initial.size(), seed);
     starts.front() = initial;
     objective.at(starts);
     std::vector<Eigen::VectorXd> steps;
@@ -190,7 +193,8 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby
     }
     objective.at(steps);
     std::vector<Run> order = objective.runs();
-    std::stable_sort(order.begin(), order.end(), [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
+    std::stable_sort(order.begin(), order.end(),
+                     [](const Run& a, const Run& b) { return a.evaluation->misfit < b.evaluation->misfit; });
     starts.clear();
     for (const Run& run : order) {
         if (run.evaluation->usable() && static_cast<int>(starts.size()) < descents_of_starts) {
@@ -209,8 +213,9 @@ bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed) {
     return nearby.ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
 }
 
-SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough, const Eigen::VectorXd& initial,
-                              unsigned seed, const std::function<void(const std::string&)>& stage) {
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
+                              const Eigen::VectorXd& initial, unsigned seed,
+                              const std::function<void(const std::string&)>& stage) {
     const int p = static_cast<int>(initial.size());
     std::vector<Eigen::VectorXd> from{initial};
     if (nearby.ways_differ) {
@@ -244,14 +249,16 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
         }
     }
     result.method = fmt::format(
-        "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other toughnesses as "
+        "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other "
+        "toughnesses as "
         "they are, and other moduli moved by their exact derivatives. From {}, and from others, up to {}, while the "
         "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
-        nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values", from.size(), descents,
-        objective.runs().size());
+        nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values",
+        from.size(), descents, objective.runs().size());
     if (unconfirmed > 0) {
         result.method += fmt::format(" It ended where runs did not confirm what those nearby promised, {:.2g} of the misfit: so "
-                                     "well is it known.", unconfirmed);
+                                     "well is it known.",
+                                     unconfirmed);
     }
     return result;
 }

@@ -35,8 +35,9 @@ struct Nearby {
 /// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where
 /// the misfit is below `enough`. It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as
 /// the noise does not explain the misfit. Where ways differ it starts from the lowest of some more such points anyway.
-SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough, const Eigen::VectorXd& initial,
-                              unsigned seed, const std::function<void(const std::string&)>& stage);
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
+                              const Eigen::VectorXd& initial, unsigned seed,
+                              const std::function<void(const std::string&)>& stage);
 
 /// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
 /// criterion.

@@ -8,8 +8,8 @@ constexpr double step = 1e-6;
 
 }  // namespace
 
-std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near, const Eigen::VectorXd& values,
-                                      const std::vector<Parameter>& parameters) {
+std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near,
+                                      const Eigen::VectorXd& values, const std::vector<Parameter>& parameters) {
     const Evaluation here = near(values);
     if (!here.usable()) {
         return std::nullopt;

@@ -19,9 +19,9 @@ struct WalkSlopes {
     Eigen::MatrixXd mean() const { return 0.5 * (from_below + from_above); }
 };
 
-/// `near` is the study near the point `values`, exact or to first order (KeptWalks::near), so that small steps give its derivatives.
-/// Absent where a run failed.
-std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near, const Eigen::VectorXd& values,
-                                      const std::vector<Parameter>& parameters);
+/// `near` is the study near the point `values`, exact or to first order (KeptWalks::near), so that small steps give its
+/// derivatives. Absent where a run failed.
+std::optional<WalkSlopes> walk_slopes(const std::function<Evaluation(const Eigen::VectorXd&)>& near,
+                                      const Eigen::VectorXd& values, const std::vector<Parameter>& parameters);
 
 }  // namespace crampfit

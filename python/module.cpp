@@ -46,7 +46,8 @@ Overrides overrides_of(const py::dict& settings) {
 }
 
 /// Runs it on a thread of its own, so that Python hears of Ctrl-C meanwhile, which asks it to stop.
-template <class Work> auto interruptible(const Work& work) {
+template <class Work>
+auto interruptible(const Work& work) {
     std::atomic<bool> stop{false}, done{false};
     std::optional<decltype(work(&stop))> result;
     std::exception_ptr thrown;
@@ -107,7 +108,8 @@ std::optional<double> number(const std::string& text) {
 }
 
 /// Columns by their names: numbers where all are, else texts.
-template <class Result> py::dict table(const Result& result, const std::string& name) {
+template <class Result>
+py::dict table(const Result& result, const std::string& name) {
     std::ostringstream csv;
     print_table(result, name, csv);
     const auto rows = rows_of(csv.str());
@@ -130,16 +132,20 @@ template <class Result> py::dict table(const Result& result, const std::string& 
     return columns;
 }
 
-template <class Result> void bind_tables(py::class_<Result>& type) {
-    type.def_property_readonly("tables", [](const Result& result) { return table_names(result); }, "names of its tables");
+template <class Result>
+void bind_tables(py::class_<Result>& type) {
+    type.def_property_readonly(
+        "tables", [](const Result& result) { return table_names(result); }, "names of its tables");
     type.def("table", &table<Result>, py::arg("name"), "one of its tables: a dict of columns, as `crampfit csv` prints them");
-    type.def("save", [](const Result& result, const Path& file) { write(result, file); }, py::arg("file"), "writes it as HDF5");
+    type.def(
+        "save", [](const Result& result, const Path& file) { write(result, file); }, py::arg("file"), "writes it as HDF5");
     type.def_property_readonly("status", [](const Result& result) { return std::string(name(result.status)); });
     type.def_readonly("message", &Result::message, "why it ended, for a person");
     type.def_readonly("seconds", &Result::seconds);
 }
 
-template <class Vector> py::array_t<double> matrix(const std::vector<Vector>& rows) {
+template <class Vector>
+py::array_t<double> matrix(const std::vector<Vector>& rows) {
     constexpr py::ssize_t columns = Vector::RowsAtCompileTime;
     py::array_t<double> array({static_cast<py::ssize_t>(rows.size()), columns});
     auto to = array.template mutable_unchecked<2>();
@@ -188,7 +194,8 @@ Record run_scene(const Path& file, const py::dict& settings) {
     });
 }
 
-template <class Options> Options options_of(int threads, const std::optional<Path>& keep, bool resume) {
+template <class Options>
+Options options_of(int threads, const std::optional<Path>& keep, bool resume) {
     Options options;
     options.threads = threads;
     if (keep) {
@@ -208,7 +215,8 @@ Fit run_fit(const Path& file, const py::dict& settings, int threads, const std::
     });
 }
 
-Sensitivity run_sensitivity(const Path& file, const py::dict& settings, int threads, const std::optional<Path>& keep, bool resume) {
+Sensitivity run_sensitivity(const Path& file, const py::dict& settings, int threads, const std::optional<Path>& keep,
+                            bool resume) {
     const Study study = open_study(file, settings);
     auto options = options_of<SensitivityOptions>(threads, keep, resume);
     return interruptible([&](const std::atomic<bool>* stop) {
@@ -226,7 +234,8 @@ Eigen::VectorXd values_of(const Study& study, const std::map<std::string, double
         values[static_cast<Eigen::Index>(j)] = found != given.end() ? found->second * parameter.unit_factor : parameter.initial;
     }
     for (const auto& [name, value] : given) {
-        const bool known = std::any_of(study.parameters.begin(), study.parameters.end(), [&](const Parameter& p) { return p.name == name; });
+        const bool known =
+            std::any_of(study.parameters.begin(), study.parameters.end(), [&](const Parameter& p) { return p.name == name; });
         if (!known) {
             throw InputError(study.file.string(), name, std::to_string(value), "is no parameter of the study");
         }
@@ -234,7 +243,8 @@ Eigen::VectorXd values_of(const Study& study, const std::map<std::string, double
     return values;
 }
 
-py::object run_evaluation(const Path& file, const std::map<std::string, double>& given, const py::dict& settings, int threads, bool gradient) {
+py::object run_evaluation(const Path& file, const std::map<std::string, double>& given, const py::dict& settings, int threads,
+                          bool gradient) {
     const Study study = open_study(file, settings);
     const Eigen::VectorXd values = values_of(study, given);
     const bool of_outputs = !study.outputs.empty();
@@ -276,7 +286,8 @@ py::object load(const Path& file) {
 void bind_results(py::module_& module) {
     py::class_<Record> record(module, "Record", "What a run gives.");
     bind_tables(record);
-    record.def_property_readonly("points", [](const Record& r) { return matrix(r.point_position); }, "undeformed places [points x 2], m");
+    record.def_property_readonly(
+        "points", [](const Record& r) { return matrix(r.point_position); }, "undeformed places [points x 2], m");
     record.def_property_readonly("frames", &frames, "the points at some instants, where the scene asks for frames");
 
     py::class_<Fit> fit(module, "Fit", "What a fit gives.");
@@ -305,16 +316,19 @@ PYBIND11_MODULE(crampfit, module) {
     const py::arg_v keep("keep", py::none(), "None");
     const py::arg_v resume("resume", false, "False");
     module.def("simulate", &run_scene, py::arg("scene"), set, "Runs a scene. `set` overrides keys, as --set does.");
-    module.def("explain", [](const Path& scene, const py::dict& settings) { return explain(open_scene(scene, settings)); }, py::arg("scene"),
-               set, "What will be modelled, by which solver, why, and what it will cost.");
+    module.def(
+        "explain", [](const Path& scene, const py::dict& settings) { return explain(open_scene(scene, settings)); },
+        py::arg("scene"), set, "What will be modelled, by which solver, why, and what it will cost.");
     module.def("fit", &run_fit, py::arg("study"), set, threads, keep, resume,
-               "Adjusts parameters until the simulations match the experiments. `keep`: a file for the runs as they end; `resume`: go on "
+               "Adjusts parameters until the simulations match the experiments. `keep`: a file for the runs as they end; "
+               "`resume`: go on "
                "from those that are there. Ctrl-C ends it with what it has.");
     module.def("sensitivity", &run_sensitivity, py::arg("study"), set, threads, keep, resume,
                "Local, Morris and Sobol sensitivity of the chosen outputs.");
     module.def("evaluate", &run_evaluation, py::arg("study"), py::arg("values") = std::map<std::string, double>(), set, threads,
                py::arg("gradient") = false,
-               "The study's outputs, or else its residuals, with these values of the parameters in their units, by name; with `gradient` "
+               "The study's outputs, or else its residuals, with these values of the parameters in their units, by name; with "
+               "`gradient` "
                "also their derivatives [results x parameters].");
     module.def("load", &load, py::arg("file"), "A record, a fit or a sensitivity study from its HDF5 file.");
 }

@@ -11,8 +11,7 @@ class TemporaryFolder {
   public:
     TemporaryFolder() {
         std::string name = (std::filesystem::temp_directory_path() / "crampfit-test-XXXXXX").string();
-        if (!::mkdtemp(name.data()))
-            throw std::runtime_error("no temporary folder: " + name);
+        if (!::mkdtemp(name.data())) throw std::runtime_error("no temporary folder: " + name);
         path_ = name;
     }
     ~TemporaryFolder() { std::filesystem::remove_all(path_); }
@@ -24,8 +23,7 @@ class TemporaryFolder {
     /// Number of files and folders directly in it, hidden ones too.
     int size() const {
         int count = 0;
-        for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(path_))
-            ++count;
+        for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(path_)) ++count;
         return count;
     }
 

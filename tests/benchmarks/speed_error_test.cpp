@@ -15,8 +15,9 @@ TEST(SystemBench, CoarsestGridsAreWithinFivePercentByBothSolvers) {
     for (const BenchRun& run : bench_runs()) {
         if (run.cells != run.problem.cells.front()) continue;
         const SpeedError row = measure(run);
-        std::printf("%s, %s, %s, %s: %g cells per %s, %ld points, %.3f s, off by %+.2f %%\n", row.problem.c_str(), row.quantity.c_str(),
-                    row.solver.c_str(), row.options.c_str(), row.cells, row.counted.c_str(), row.points, row.seconds, 100 * row.error);
+        std::printf("%s, %s, %s, %s: %g cells per %s, %ld points, %.3f s, off by %+.2f %%\n", row.problem.c_str(),
+                    row.quantity.c_str(), row.solver.c_str(), row.options.c_str(), row.cells, row.counted.c_str(), row.points,
+                    row.seconds, 100 * row.error);
         EXPECT_LT(std::abs(row.error), 0.05) << row.problem << " " << row.solver;
         EXPECT_GT(row.seconds, 0.0);
         explicit_runs += row.solver == "explicit";

@@ -20,11 +20,12 @@ struct Block {
     bool rings = false;
     double cell = 0.25;  // of the model that is fitted; the truth's is half of it [mm]
     int frames = 5;
-    double pixel = 40;   // [um]
-    int subset = 21;     // [px]
+    double pixel = 40;  // [um]
+    int subset = 21;    // [px]
 
     std::string scene(double with_cell) const {
-        return fmt::format(R"(
+        return fmt::format(
+            R"(
 [model]
 plane = "strain"
 thickness = "10 mm"
@@ -69,8 +70,10 @@ displacement = "{}"
 [output]
 frames = {}
 )",
-                           with_cell, rings ? R"(rings = { pith = ["-20 mm", "5 mm"], period = "3 mm", latewood_fraction = 0.3, transition = "0 mm" })" : "material = \"EW\"",
-                           rings ? "0.48 mm" : "0.45 mm", frames);
+            with_cell,
+            rings ? R"(rings = { pith = ["-20 mm", "5 mm"], period = "3 mm", latewood_fraction = 0.3, transition = "0 mm" })"
+                  : "material = \"EW\"",
+            rings ? "0.48 mm" : "0.45 mm", frames);
     }
 };
 
@@ -88,29 +91,26 @@ std::vector<std::vector<std::string>> rows_of(const std::string& csv) {
     while (std::getline(lines, line)) {
         std::istringstream in(line);
         std::vector<std::string>& row = rows.emplace_back();
-        for (std::string field; std::getline(in, field, ',');)
-            row.push_back(field);
+        for (std::string field; std::getline(in, field, ',');) row.push_back(field);
     }
     return rows;
 }
 
 std::vector<std::string> images_of(const Command& command, int frames) {
     std::vector<std::string> names{command.path("pictures/reference.png")};
-    for (int i = 0; i < frames; ++i)
-        names.push_back(command.path(fmt::format("pictures/image_{:04}.png", i)));
+    for (int i = 0; i < frames; ++i) names.push_back(command.path(fmt::format("pictures/image_{:04}.png", i)));
     return names;
 }
 
 Outcome with_images(Command& command, const std::string& verb, const Block& block, const std::string& output) {
     std::vector<std::string> words{verb};
-    for (const std::string& name : images_of(command, block.frames))
-        words.push_back(name);
-    for (const std::string& word : {std::string("-o"), command.path(output), std::string("--pixel"), fmt::format("{} um", block.pixel),
-                                    std::string("--subset"), std::to_string(block.subset), std::string("--times"), command.path("pictures/load.csv"),
-                                    std::string("--preview"), command.path(verb + ".png")})
+    for (const std::string& name : images_of(command, block.frames)) words.push_back(name);
+    for (const std::string& word :
+         {std::string("-o"), command.path(output), std::string("--pixel"), fmt::format("{} um", block.pixel),
+          std::string("--subset"), std::to_string(block.subset), std::string("--times"), command.path("pictures/load.csv"),
+          std::string("--preview"), command.path(verb + ".png")})
         words.push_back(word);
-    if (verb == "track")
-        words.insert(words.end(), {"--load", command.path("pictures/load.csv")});
+    if (verb == "track") words.insert(words.end(), {"--load", command.path("pictures/load.csv")});
     return command.run(words);
 }
 
@@ -119,7 +119,8 @@ void simulate_and_photograph(Command& command, const Block& block) {
     command.folder.write("scene.toml", block.scene(block.cell));
     const Outcome run = command.run({"simulate", command.path("truth.toml"), "-o", command.path("record.h5")});
     ASSERT_EQ(run.status, 0) << run.error;
-    const Outcome taken = command.run({"camera", command.path("record.h5"), "-o", command.path("pictures"), "--pixel", fmt::format("{} um", block.pixel)});
+    const Outcome taken = command.run(
+        {"camera", command.path("record.h5"), "-o", command.path("pictures"), "--pixel", fmt::format("{} um", block.pixel)});
     ASSERT_EQ(taken.status, 0) << taken.error;
 }
 
@@ -135,26 +136,27 @@ void expect_tips(Command& command, const Block& block) {
     int count = 0;
     for (std::size_t i = 1; i < truth.size(); ++i) {  // the first picture is of the unloaded specimen
         const double x = std::stod(truth[i][2]), y = std::stod(truth[i][3]);
-        if (x > 12e3 / block.pixel - 1.5 * block.subset)
-            continue;  // it has left, or is about to
+        if (x > 12e3 / block.pixel - 1.5 * block.subset) continue;  // it has left, or is about to
         ASSERT_EQ(found[i][6], "ok") << "image " << i;
         const double off = std::stod(found[i][2]) - x;
         const double distance = std::hypot(off, std::stod(found[i][3]) - y);
-        std::printf("image %zu: tip at %.1f, %.1f; found off by %.1f, %.1f px, sigma %.1f px\n", i, x, y, off, std::stod(found[i][3]) - y,
-                    std::stod(found[i][5]) / (1e-6 * block.pixel));
+        std::printf("image %zu: tip at %.1f, %.1f; found off by %.1f, %.1f px, sigma %.1f px\n", i, x, y, off,
+                    std::stod(found[i][3]) - y, std::stod(found[i][5]) / (1e-6 * block.pixel));
         sum += off;
         worst = std::max(worst, distance);
         ++count;
     }
     ASSERT_GE(count, 3);
-    std::printf("tips in %d images: worst %.1f px of %d, mean %.1f px of %.1f\n", count, worst, 2 * block.subset, sum / count, 0.5 * block.subset);
+    std::printf("tips in %d images: worst %.1f px of %d, mean %.1f px of %.1f\n", count, worst, 2 * block.subset, sum / count,
+                0.5 * block.subset);
     std::fflush(stdout);
     EXPECT_LT(worst, 2 * block.subset);
     EXPECT_LT(std::abs(sum / count), 0.5 * block.subset);
 }
 
 std::string parameter(const std::string& key, const char* unit, double truth) {
-    return fmt::format("[[parameters]]\nname = \"{}\"\nkey = \"materials.{}\"\ninitial = \"{} {}\"\nlower = \"{} {}\"\nupper = \"{} {}\"\nscale = \"log\"\n\n",
+    return fmt::format("[[parameters]]\nname = \"{}\"\nkey = \"materials.{}\"\ninitial = \"{} {}\"\nlower = \"{} {}\"\nupper = "
+                       "\"{} {}\"\nscale = \"log\"\n\n",
                        key, key, 1.5 * truth, unit, 0.3 * truth, unit, 3 * truth, unit);
 }
 
@@ -172,20 +174,20 @@ noise = { force = "0.3 N", crack_length = "0.3 mm", displacement_field = "1 um" 
 max_runs = 200
 
 )";
-    for (const auto& [key, value] : truth)
-        study += parameter(key, contains(key, "tough") ? "J/m^2" : "MPa", value);
+    for (const auto& [key, value] : truth) study += parameter(key, contains(key, "tough") ? "J/m^2" : "MPa", value);
     command.folder.write("study.toml", study);
     const Outcome fitted = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
     ASSERT_EQ(fitted.status, 0) << fitted.error;
     const Fit fit = read_fit(command.path("fit.h5"));
     for (std::size_t j = 0; j < truth.size(); ++j) {
         const FittedParameter& p = fit.parameters[j];
-        std::printf("%s: %.4g %s, true %.4g (%+.2f %%), 95 %% within %.4g .. %.4g\n", p.name.c_str(), p.value, p.unit.c_str(), truth[j].second,
-                    100 * (p.value / truth[j].second - 1), p.lower_95, p.upper_95);
+        std::printf("%s: %.4g %s, true %.4g (%+.2f %%), 95 %% within %.4g .. %.4g\n", p.name.c_str(), p.value, p.unit.c_str(),
+                    truth[j].second, 100 * (p.value / truth[j].second - 1), p.lower_95, p.upper_95);
         EXPECT_NEAR(p.value, truth[j].second, tolerance * truth[j].second);
     }
     std::fflush(stdout);
-    std::printf("%zu runs, %.1f s, reduced chi-square %.3g\n%s\n", fit.runs.size(), fit.seconds, fit.reduced_chi_square, fit.message.c_str());
+    std::printf("%zu runs, %.1f s, reduced chi-square %.3g\n%s\n", fit.runs.size(), fit.seconds, fit.reduced_chi_square,
+                fit.message.c_str());
 }
 
 }  // namespace

@@ -27,11 +27,9 @@ class Command {
     /// Starts it and returns; `finish` must follow.
     void start(const std::vector<std::string>& arguments) {
         process_ = ::fork();
-        if (process_ != 0)
-            return;
+        if (process_ != 0) return;
         std::vector<char*> words{const_cast<char*>(COMMAND)};
-        for (const std::string& argument : arguments)
-            words.push_back(const_cast<char*>(argument.c_str()));
+        for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
         words.push_back(nullptr);
         if (!std::freopen((folder / "out.txt").c_str(), "w", stdout) ||
             !std::freopen((folder / "error.txt").c_str(), "w", stderr))
@@ -58,8 +56,7 @@ class Command {
     /// Waits until `text` stands in a file of the folder, a minute at most; false when it did not come.
     bool wait_for(const std::string& file, const std::string& text) const {
         for (int i = 0; i < 6000; ++i) {
-            if (folder.read(file).find(text) != std::string::npos)
-                return true;
+            if (folder.read(file).find(text) != std::string::npos) return true;
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
         }
         return false;

@@ -83,8 +83,7 @@ TEST(SystemCommand, SimulateSavesARecord) {
 TEST(SystemCommand, QuietSaysNothing) {
     Command command;
     command.folder.write("scene.toml", small_scene);
-    const Outcome outcome =
-        command.run({"simulate", "--quiet", command.path("scene.toml"), "-o", command.path("record.h5")});
+    const Outcome outcome = command.run({"simulate", "--quiet", command.path("scene.toml"), "-o", command.path("record.h5")});
     EXPECT_EQ(outcome.status, 0);
     EXPECT_EQ(outcome.out + outcome.error, "");
 }
@@ -92,8 +91,8 @@ TEST(SystemCommand, QuietSaysNothing) {
 TEST(SystemCommand, PlainProgressIsALineATenth) {
     Command command;
     command.folder.write("scene.toml", small_scene);
-    const Outcome outcome = command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"),
-                                         "--set", "edges.top.velocity=[\"0 m/s\", \"0.2 m/s\"]"});
+    const Outcome outcome = command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--set",
+                                         "edges.top.velocity=[\"0 m/s\", \"0.2 m/s\"]"});
     EXPECT_TRUE(contains(outcome.error, " steps/s")) << outcome.error;
     EXPECT_FALSE(contains(outcome.error, "\r")) << outcome.error;
     const auto lines = std::count(outcome.error.begin(), outcome.error.end(), '\n');
@@ -103,9 +102,9 @@ TEST(SystemCommand, PlainProgressIsALineATenth) {
 TEST(SystemCommand, SetOverridesKeysOfTheFile) {
     Command command;
     command.folder.write("scene.toml", small_scene);
-    const Outcome outcome = command.run({"simulate", "--set", "stop.displacement=0.05 mm", "--set",
-                                         "edges.top.velocity=[\"0 m/s\", \"2 m/s\"]", command.path("scene.toml"), "-o",
-                                         command.path("record.h5"), "--threads", "1"});
+    const Outcome outcome =
+        command.run({"simulate", "--set", "stop.displacement=0.05 mm", "--set", "edges.top.velocity=[\"0 m/s\", \"2 m/s\"]",
+                     command.path("scene.toml"), "-o", command.path("record.h5"), "--threads", "1"});
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     const Instant last = read_record(command.path("record.h5")).series.back();
     // To one step of less than 0.8 us.
@@ -157,8 +156,8 @@ TEST(SystemCommand, InterruptedRunIsSaved) {
     for (const int signal : {SIGINT, SIGTERM}) {
         Command command;
         command.folder.write("scene.toml", endless_scene);
-        command.start({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--log",
-                       command.path("log.txt")});
+        command.start(
+            {"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--log", command.path("log.txt")});
         EXPECT_TRUE(command.wait_for("log.txt", "scene is read"));
         command.send(signal);
         const Outcome outcome = command.finish();
@@ -172,8 +171,7 @@ TEST(SystemCommand, InterruptedRunIsSaved) {
 TEST(SystemCommand, LogIsAppendedWithTimes) {
     Command command;
     command.folder.write("scene.toml", small_scene);
-    for (int i = 0; i < 2; ++i)
-        command.run({"explain", command.path("scene.toml"), "--log", command.path("log.txt")});
+    for (int i = 0; i < 2; ++i) command.run({"explain", command.path("scene.toml"), "--log", command.path("log.txt")});
     command.run({"explain", command.path("none.toml"), "--log", command.path("log.txt")});
     const std::string log = command.folder.read("log.txt");
     EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 4) << log;
@@ -201,8 +199,7 @@ TEST(SystemCommand, CsvBearsAReaderThatLeaves) {
     Record record;
     record.series.resize(100000);  // more text than a pipe holds
     write(record, command.path("record.h5"));
-    const std::string csv =
-        std::string(COMMAND) + " csv " + command.path("record.h5") + " series 2>" + command.path("error.txt");
+    const std::string csv = std::string(COMMAND) + " csv " + command.path("record.h5") + " series 2>" + command.path("error.txt");
     // The shell's status is that of `head`; the command's own is put into a file.
     const std::string line =
         "{ " + csv + "; echo $? >" + command.path("status.txt") + "; } | head -1 >" + command.path("out.txt");
@@ -215,8 +212,8 @@ TEST(SystemCommand, CsvBearsAReaderThatLeaves) {
 TEST(SystemCommand, FullStandardOutputIsAnError) {
     Command command;
     write(Record{}, command.path("record.h5"));
-    const std::string line = std::string(COMMAND) + " csv " + command.path("record.h5") + " series >/dev/full 2>" +
-                             command.path("error.txt");
+    const std::string line =
+        std::string(COMMAND) + " csv " + command.path("record.h5") + " series >/dev/full 2>" + command.path("error.txt");
     EXPECT_EQ(WEXITSTATUS(std::system(line.c_str())), 2);
     EXPECT_TRUE(contains(command.folder.read("error.txt"), "standard output")) << command.folder.read("error.txt");
 }

@@ -19,8 +19,7 @@ std::vector<std::map<std::string, std::string>> rows_of(const std::string& csv) 
     const auto fields = [](const std::string& line) {
         std::vector<std::string> parts;
         std::istringstream in(line);
-        for (std::string part; std::getline(in, part, ',');)
-            parts.push_back(part);
+        for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
         return parts;
     };
     std::istringstream lines(csv);
@@ -30,8 +29,7 @@ std::vector<std::map<std::string, std::string>> rows_of(const std::string& csv) 
     std::vector<std::map<std::string, std::string>> rows;
     while (std::getline(lines, line)) {
         const std::vector<std::string> values = fields(line);
-        for (std::size_t i = 0; i < names.size(); ++i)
-            (i == 0 ? rows.emplace_back() : rows.back())[names[i]] = values.at(i);
+        for (std::size_t i = 0; i < names.size(); ++i) (i == 0 ? rows.emplace_back() : rows.back())[names[i]] = values.at(i);
     }
     return rows;
 }
@@ -43,8 +41,7 @@ const VirtualCamera& camera() {
 
 std::string big_endian(std::uint32_t value) {
     std::string bytes;
-    for (const int shift : {24, 16, 8, 0})
-        bytes += static_cast<char>(value >> shift & 0xff);
+    for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(value >> shift & 0xff);
     return bytes;
 }
 
@@ -85,9 +82,7 @@ TEST(SystemCorrelate, BadPicturesAreNamed) {
     Command command;
     const std::string good = write_pgm(command, "good.pgm", camera().photograph(0));
     const std::string whole = command.folder.read("good.pgm");
-    const auto file = [&](const char* name, const std::string& bytes) {
-        return command.folder.write(name, bytes).string();
-    };
+    const auto file = [&](const char* name, const std::string& bytes) { return command.folder.write(name, bytes).string(); };
     const std::string black(240 * 200, '\0');
     const std::string huge = "P5\n30000 30000\n255\n";
     const std::map<std::string, std::string> bad{
@@ -127,10 +122,9 @@ TEST(SystemTrack, SeriesAndExperiment) {
     words.push_back(write_pgm(command, "4.pgm", camera().photograph(4)));  // nothing has moved
     const std::string times = command.folder.write("times.csv", "time [s]\n1\n2\n3\n4\n").string();
     const std::string load =
-        command.folder.write("load.csv", "time [s],force [N],displacement [mm]\n0,0,0\n2,10,0.2\n3.5,40,0.35\n")
-            .string();
-    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--times", times, "--load", load,
-                               "--preview", command.path("p.png")});
+        command.folder.write("load.csv", "time [s],force [N],displacement [mm]\n0,0,0\n2,10,0.2\n3.5,40,0.35\n").string();
+    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--times", times, "--load", load, "--preview",
+                               command.path("p.png")});
     const Outcome outcome = command.run(words);
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_GT(command.folder.read("p.png").size(), 1000u);
@@ -148,8 +142,7 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_EQ(rows[3]["status"], "no crack");
     EXPECT_EQ(rows[3]["tip_x_px"], "nan");
 
-    const auto data =
-        command.folder.write("experiment.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out);
+    const auto data = command.folder.write("experiment.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out);
     const Curves curves = read_curves(data);
     ASSERT_EQ(curves.time.size(), 4u);
     EXPECT_NEAR(curves.force[0], 5, 1e-9);
@@ -160,15 +153,16 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_TRUE(std::isnan(curves.crack_length[3]));
 }
 
-// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where the gap covers a
-// pixel's centre, and so nothing of the last 5 px, which are open by less than 0.7 px.
+// A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where
+// the gap covers a pixel's centre, and so nothing of the last 5 px, which are open by less than 0.7 px.
 TEST(SystemTrack, PlainGrayIsTrackedByTheLineThatOpens) {
     Command command;
     const VirtualCamera plain({.columns = 240, .rows = 200, .contrast = 0.5});
     std::vector<std::string> pictures{write_pgm(command, "0.pgm", plain.photograph(0))};
     const std::vector<double> tips{90, 130};
     for (std::size_t i = 0; i < tips.size(); ++i)
-        pictures.push_back(write_pgm(command, std::to_string(i + 1) + ".pgm", plain.photograph(crack_field({tips[i], 100.2}, 0, 3, 0), i + 1)));
+        pictures.push_back(
+            write_pgm(command, std::to_string(i + 1) + ".pgm", plain.photograph(crack_field({tips[i], 100.2}, 0, 3, 0), i + 1)));
     pictures.push_back(write_pgm(command, "3.pgm", plain.photograph(3)));  // nothing has opened
     const auto track = [&](const std::string& from) {
         std::vector<std::string> words{"track"};
@@ -191,8 +185,7 @@ TEST(SystemTrack, PlainGrayIsTrackedByTheLineThatOpens) {
         }
         EXPECT_EQ(rows[2]["status"], "no crack") << from;
     }
-    for (auto& row : track("fields"))
-        EXPECT_EQ(row["status"], "too few points");
+    for (auto& row : track("fields")) EXPECT_EQ(row["status"], "too few points");
     EXPECT_EQ(command.run({"track", pictures[0], pictures[1], "-o", command.path("other.h5"), "--from", "dots"}).status, 2);
 }
 

@@ -31,10 +31,11 @@ upper = "80 MPa"
 )";
 
 std::string request(const std::string& toughness, const std::string& modulus, const std::vector<int>& active) {
-    std::string text = fmt::format("2 variables\n{} the_modulus\n{} materials.EW.toughness\n{} functions\n", modulus, toughness, active.size());
-    for (std::size_t k = 0; k < active.size(); ++k)
-        text += fmt::format("{} ASV_{}:f{}\n", active[k], k + 1, k + 1);
-    return text + "2 derivative_variables\n1 DVV_1:the_modulus\n2 DVV_2:materials.EW.toughness\n0 analysis_components\n1 eval_id\n";
+    std::string text =
+        fmt::format("2 variables\n{} the_modulus\n{} materials.EW.toughness\n{} functions\n", modulus, toughness, active.size());
+    for (std::size_t k = 0; k < active.size(); ++k) text += fmt::format("{} ASV_{}:f{}\n", active[k], k + 1, k + 1);
+    return text +
+           "2 derivative_variables\n1 DVV_1:the_modulus\n2 DVV_2:materials.EW.toughness\n0 analysis_components\n1 eval_id\n";
 }
 
 struct Evaluator : Command {
@@ -46,8 +47,7 @@ struct Evaluator : Command {
         std::vector<double> found;
         std::istringstream words(folder.read("results.out"));
         for (std::string word; words >> word;)
-            if (word.find_first_not_of("+-.0123456789e") == std::string::npos)
-                found.push_back(std::stod(word));
+            if (word.find_first_not_of("+-.0123456789e") == std::string::npos) found.push_back(std::stod(word));
         return found;
     }
 };
@@ -58,7 +58,8 @@ struct Evaluator : Command {
 TEST(SystemCommand, EvaluateGivesOutputsAndTheirGradients) {
     Evaluator command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", "scene = \"scene.toml\"\noutputs = [\"peak force\", \"initial stiffness\"]\n" + parameters);
+    command.folder.write("study.toml",
+                         "scene = \"scene.toml\"\noutputs = [\"peak force\", \"initial stiffness\"]\n" + parameters);
     const Outcome outcome = command.evaluate(request("90", "60", {3, 3}));
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     const std::vector<double> n = command.numbers();
@@ -71,8 +72,7 @@ TEST(SystemCommand, EvaluateGivesOutputsAndTheirGradients) {
                                            "materials.EW.E=60 MPa", "--set", "materials.EW.toughness=90 J/m^2"});
     ASSERT_EQ(simulated.status, 0);
     double peak = 0;
-    for (const Instant& instant : read_record(command.path("r.h5")).series)
-        peak = std::max(peak, instant.force);
+    for (const Instant& instant : read_record(command.path("r.h5")).series) peak = std::max(peak, instant.force);
     EXPECT_NEAR(n[0], peak, 1e-9 * peak);
     ASSERT_EQ(command.evaluate(request("90", "60", {0, 1})).status, 0);
     EXPECT_EQ(command.numbers(), std::vector<double>{n[1]});
@@ -81,7 +81,9 @@ TEST(SystemCommand, EvaluateGivesOutputsAndTheirGradients) {
 TEST(SystemCommand, EvaluateGivesResidualsOrTheirSquaresSummed) {
     Evaluator command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", "[[experiments]]\nscene = \"scene.toml\"\ndata = \"data.csv\"\nnoise = { force = \"0.1 N\" }\n" + parameters);
+    command.folder.write("study.toml",
+                         "[[experiments]]\nscene = \"scene.toml\"\ndata = \"data.csv\"\nnoise = { force = \"0.1 N\" }\n" +
+                             parameters);
     command.folder.write("data.csv", "displacement [mm],force [N]\n0,0\n0.1,3\n0.2,5\n0.3,8\n");
     ASSERT_EQ(command.evaluate(request("90", "60", {1, 1, 1, 1})).status, 0) << command.folder.read("results.out");
     const std::vector<double> residuals = command.numbers();
@@ -89,8 +91,7 @@ TEST(SystemCommand, EvaluateGivesResidualsOrTheirSquaresSummed) {
     const std::vector<double> misfit = command.numbers();
     ASSERT_EQ(misfit.size(), 3u);
     double sum = 0;
-    for (const double r : residuals)
-        sum += r * r;
+    for (const double r : residuals) sum += r * r;
     EXPECT_NEAR(misfit[0], sum, 1e-12 * sum);
     // Its slope by the modulus against that of the misfit itself.
     ASSERT_EQ(command.evaluate(request("90", "60.01", {1})).status, 0);

@@ -109,16 +109,15 @@ TEST(SystemCommand, BadStudyIsStatusTwoAndNamesFileAndKey) {
     EXPECT_FALSE(std::filesystem::exists(command.path("fit.h5")));
 }
 
-// A fixture that gives way and begins loose: what it does to the curve takes no further run, and with its compliance given the modulus
-// and the slack are found as exactly as the data say them.
+// A fixture that gives way and begins loose: what it does to the curve takes no further run, and with its compliance given the
+// modulus and the slack are found as exactly as the data say them.
 TEST(SystemCommand, FitSeesThroughTheMachine) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
     ASSERT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("truth.h5"), "--quiet"}).status, 0);
     Curves curves;
     for (const Instant& instant : read_record(command.path("truth.h5")).series) {
-        if (instant.force > 60)
-            break;  // before the crack moves
+        if (instant.force > 60) break;  // before the crack moves
         curves.displacement.push_back(instant.displacement + 0.3e-6 * instant.force + 5e-6);
         curves.force.push_back(instant.force - 0.25);
     }
@@ -131,8 +130,9 @@ initial = "0 um"
 lower = "-20 um"
 upper = "20 um"
 )");
-    const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5"), "--quiet", "--set",
-                                         "experiments.pull.compliance=0.3 um/N", "--set", "experiments.pull.force_offset=-0.25 N"});
+    const Outcome outcome =
+        command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5"), "--quiet", "--set",
+                     "experiments.pull.compliance=0.3 um/N", "--set", "experiments.pull.force_offset=-0.25 N"});
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     const Fit fit = read_fit(command.path("fit.h5"));
     EXPECT_NEAR(fit.parameters[0].value, 40.0, 40e-6);

@@ -44,9 +44,9 @@ TEST(SystemGrain, APictureOfAnglesIsTheDirectionThatItShows) {
     command.folder.write("wood.pgm", head + std::string(400, '\xc8'));
     command.folder.write("angles.pgm", head + std::string(400, '\x55'));
     const std::vector<double> number = force_curve(command, orthotropic("material = \"EW\"\nradial = \"60 deg\""));
-    const std::vector<double> picture = force_curve(
-        command, orthotropic("image = \"wood.pgm\"\npixel = \"0.5 mm\"\norientation = \"angles.pgm\"\n"
-                             "classes = [ { material = \"EW\", gray = [0, 255] } ]"));
+    const std::vector<double> picture =
+        force_curve(command, orthotropic("image = \"wood.pgm\"\npixel = \"0.5 mm\"\norientation = \"angles.pgm\"\n"
+                                         "classes = [ { material = \"EW\", gray = [0, 255] } ]"));
     const std::vector<double> turned = force_curve(command, orthotropic("material = \"EW\"\nradial = \"0 deg\""));
     ASSERT_GT(number.size(), 10u);
     ASSERT_EQ(picture.size(), number.size());

@@ -5,13 +5,17 @@
 
 namespace {
 
-// Rows of the series, with all their digits, after a run with so many threads, asked for by option and by the libraries' variables.
+// Rows of the series, with all their digits, after a run with so many threads, asked for by option and by the libraries'
+// variables.
 std::string series(const std::string& scene, const std::string& kind, const std::string& threads) {
     for (const char* variable : {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"}) ::setenv(variable, threads.c_str(), 1);
     Command command;
     command.folder.write("scene.toml", scene);
-    EXPECT_EQ(command.run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--threads", threads, "--quiet",
-                           "--set", "solver.kind=\"" + kind + "\""}).status, 0);
+    EXPECT_EQ(command
+                  .run({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--threads", threads, "--quiet",
+                        "--set", "solver.kind=\"" + kind + "\""})
+                  .status,
+              0);
     return command.run({"csv", command.path("record.h5"), "series"}).out;
 }
 

@@ -96,8 +96,7 @@ std::map<std::string, std::vector<double>> distances_of(const std::string& csv) 
     for (std::getline(lines, line); std::getline(lines, line);) {
         std::vector<std::string> row;
         std::istringstream in(line);
-        for (std::string field; std::getline(in, field, ',');)
-            row.push_back(field);
+        for (std::string field; std::getline(in, field, ',');) row.push_back(field);
         distances[row.at(1)] = {std::stod(row.at(2)), std::stod(row.at(3)), std::stod(row.at(4))};
     }
     return distances;
@@ -118,9 +117,9 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
     done({"camera", command.path("truth.h5"), "-o", command.path("pictures"), "--pixel", "20 um", "--wood", SAMPLES "/rings.png",
           "--noise", "2"});
     std::vector<std::string> words{"track", command.path("pictures/reference.png")};
-    for (int i = 0; i < frames; ++i)
-        words.push_back(command.path(fmt::format("pictures/image_{:04}.png", i)));
-    words.insert(words.end(), {"-o", command.path("track.h5"), "--pixel", "20 um", "--from", "gray", "--preview", command.path("track.png")});
+    for (int i = 0; i < frames; ++i) words.push_back(command.path(fmt::format("pictures/image_{:04}.png", i)));
+    words.insert(words.end(),
+                 {"-o", command.path("track.h5"), "--pixel", "20 um", "--from", "gray", "--preview", command.path("track.png")});
     done(words);
     EXPECT_GT(done({"csv", command.path("track.h5"), "ways"}).out.size(), 1000u);
     Curves curves;
@@ -136,12 +135,14 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
     auto distances = distances_of(done({"csv", command.path("fit.h5"), "path_distances"}).out);
     ASSERT_EQ(distances.size(), 2u);
     for (const auto& [model, distance] : distances)
-        std::printf("%s: mean %.3f, largest %.3f mm over %.2f mm\n", model.c_str(), 1e3 * distance[0], 1e3 * distance[1], 1e3 * distance[2]);
+        std::printf("%s: mean %.3f, largest %.3f mm over %.2f mm\n", model.c_str(), 1e3 * distance[0], 1e3 * distance[1],
+                    1e3 * distance[2]);
     std::fflush(stdout);
     // The right model has the path but for what the pictures say of it: a few pixels of 20 um.
     EXPECT_LT(distances["normal to opening"][0], 0.06e-3);
     EXPECT_LT(distances["normal to opening"][0], 0.5 * distances["straight"][0]);
-    EXPECT_NEAR(distances["normal to opening"][2], 5e-3, 0.2e-3);  // from the notch's tip to the side, over which they have both grown
+    EXPECT_NEAR(distances["normal to opening"][2], 5e-3,
+                0.2e-3);  // from the notch's tip to the side, over which they have both grown
 
     done({"report", command.path("fit.h5"), "-o", command.path("fit.html")});
     const std::string page = command.folder.read("fit.html");
@@ -187,6 +188,7 @@ TEST(SystemPaths, PicturesThatDoNotFitAreRefusedBeforeAnythingRuns) {
         EXPECT_FALSE(std::filesystem::exists(command.path("fit.h5.runs")));
     };
     refused(R"({ picture = "text.png", pixel = "20 um" })", "experiments.block.photograph.picture");
-    refused(fmt::format(R"({{ picture = "{}/rings.png", pixel = "20 um", offset = ["1 m", "0 m"] }})", SAMPLES), "shows nothing of the specimen");
+    refused(fmt::format(R"({{ picture = "{}/rings.png", pixel = "20 um", offset = ["1 m", "0 m"] }})", SAMPLES),
+            "shows nothing of the specimen");
     refused(R"({ picture = "text.png" })", "edge of a pixel");
 }

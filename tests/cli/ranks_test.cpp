@@ -57,9 +57,10 @@ max_runs = 24
 )";
 
 Outcome on_ranks(Command& command, int ranks, int threads, const std::string& verb, const std::string& output) {
-    const std::string words = fmt::format("cd {} && mpirun --allow-run-as-root --oversubscribe --bind-to none -n {} {} {} study.toml -o {} "
-                                          "--threads {} > out.txt 2> error.txt",
-                                          command.path("."), ranks, COMMAND, verb, output, threads);
+    const std::string words =
+        fmt::format("cd {} && mpirun --allow-run-as-root --oversubscribe --bind-to none -n {} {} {} study.toml -o {} "
+                    "--threads {} > out.txt 2> error.txt",
+                    command.path("."), ranks, COMMAND, verb, output, threads);
     const int status = std::system(words.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 255, command.folder.read("out.txt"), command.folder.read("error.txt")};
 }
@@ -81,14 +82,16 @@ TEST(SystemRanks, SensitivityHasTheSameBits) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
     command.folder.write("study.toml", sensitivity_study);
-    ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("alone.h5"), "--threads", "1"}).status, 0);
+    ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("alone.h5"), "--threads", "1"}).status,
+              0);
     const std::string indices = command.run({"csv", command.path("alone.h5"), "indices"}).out;
     const std::string runs = command.run({"csv", command.path("alone.h5"), "runs"}).out;
     for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {2, 2}, {4, 1}, {4, 2}}) {
         const Outcome outcome = on_ranks(command, ranks, threads, "sensitivity", "ranks.h5");
         ASSERT_EQ(outcome.status, 0) << outcome.error;
         EXPECT_EQ(command.run({"csv", command.path("ranks.h5"), "indices"}).out, indices) << ranks << " ranks";
-        EXPECT_EQ(without_seconds(command.run({"csv", command.path("ranks.h5"), "runs"}).out), without_seconds(runs)) << ranks << " ranks";
+        EXPECT_EQ(without_seconds(command.run({"csv", command.path("ranks.h5"), "runs"}).out), without_seconds(runs))
+            << ranks << " ranks";
     }
 }
 
@@ -118,8 +121,7 @@ TEST(SystemRanks, FailedRunsAreRecorded) {
     EXPECT_EQ(outcome.status, 1) << outcome.error;
     const std::string runs = command.run({"csv", command.path("ranks.h5"), "runs"}).out;
     int failed = 0;
-    for (std::size_t at = 0; (at = runs.find("longer than runs.time_limit", at)) != std::string::npos; ++at)
-        ++failed;
+    for (std::size_t at = 0; (at = runs.find("longer than runs.time_limit", at)) != std::string::npos; ++at) ++failed;
     EXPECT_EQ(failed, 32) << runs;
     EXPECT_TRUE(contains(outcome.error, "to run it again")) << outcome.error;
 }
@@ -141,9 +143,11 @@ TEST(SystemRanks, ALostRankCostsNoRunThatHasEnded) {
     EXPECT_FALSE(std::filesystem::exists(command.path("lost.h5")));
     const auto kept = command.folder.read("lost.h5.runs").size();
     EXPECT_GT(kept, 500u);
-    ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("lost.h5"), "--resume", "--quiet"}).status, 0);
+    ASSERT_EQ(
+        command.run({"sensitivity", command.path("study.toml"), "-o", command.path("lost.h5"), "--resume", "--quiet"}).status, 0);
     ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("alone.h5"), "--quiet"}).status, 0);
-    EXPECT_EQ(command.run({"csv", command.path("lost.h5"), "indices"}).out, command.run({"csv", command.path("alone.h5"), "indices"}).out);
+    EXPECT_EQ(command.run({"csv", command.path("lost.h5"), "indices"}).out,
+              command.run({"csv", command.path("alone.h5"), "indices"}).out);
     EXPECT_EQ(command.folder.read("lost.h5.runs").size(), command.folder.read("alone.h5.runs").size());  // none was run twice
 }
 

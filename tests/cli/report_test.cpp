@@ -19,8 +19,7 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 int count(const std::string& text, const std::string& part) {
     int found = 0;
-    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size()))
-        ++found;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++found;
     return found;
 }
 
@@ -87,10 +86,17 @@ Fit small_fit() {
     }
     fit.models = {{"hoop stress", "converged", 5, {40, 100}, 9, 11, 0.9}, {"straight", "converged", 9, {41, 99}, 13, 15, 0.1}};
     const std::vector<Vec2> photographed{{0, 5e-3}, {4e-3, 5e-3}, {9e-3, 7e-3}}, straight{{0, 5e-3}, {9e-3, 5e-3}};
-    fit.crack_paths = {{"pull", true, {200, 100, std::vector<std::uint8_t>(20000, 180), {-1e-3, 0}, {11e-3, 6e-3}}, photographed,
-                        {{"hoop stress", "finished", {photographed}, 1e-5, 2e-5, 5e-3}, {"straight", "split", {straight}, 1e-3, 2e-3, 5e-3}}},
-                       {"other", false, {30, 30, std::vector<std::uint8_t>(900, 90), {0, 0}, {1e-2, 1e-2}}, {},
-                        {{"hoop stress", "no run ended well", {}}, {"straight", "finished", {straight}}}}};
+    fit.crack_paths = {
+        {"pull",
+         true,
+         {200, 100, std::vector<std::uint8_t>(20000, 180), {-1e-3, 0}, {11e-3, 6e-3}},
+         photographed,
+         {{"hoop stress", "finished", {photographed}, 1e-5, 2e-5, 5e-3}, {"straight", "split", {straight}, 1e-3, 2e-3, 5e-3}}},
+        {"other",
+         false,
+         {30, 30, std::vector<std::uint8_t>(900, 90), {0, 0}, {1e-2, 1e-2}},
+         {},
+         {{"hoop stress", "no run ended well", {}}, {"straight", "finished", {straight}}}}};
     fit.checks = {{"pull", "force", 20, 0.8, 1, 0.9, 1e-5}, {"pull", "arrival", 20, 0, 1, 0, 0.5}};
     fit.misfit = 5;
     fit.reduced_chi_square = 0.2;
@@ -162,9 +168,10 @@ TEST(SystemReport, PageOfAFitShowsThePathOfEachModelOverThePhotographedOne) {
     write(small_fit(), command.path("fit.h5"));
     const std::string page = report(command, "fit.h5");
     // In the table of evidence: over both experiments, of which one was photographed.
-    for (const char* part : {"Path off by, mean [mm]", "<td class=\"number\">0.010</td><td class=\"number\">0.020</td>",
-                             "<td class=\"number\">1.000</td><td class=\"number\">2.000</td>", "Over [mm]", "no run ended well", "pull: photograph",
-                             "pull: hoop stress", "pull: straight", "other: wood of the model", "other: straight"})
+    for (const char* part :
+         {"Path off by, mean [mm]", "<td class=\"number\">0.010</td><td class=\"number\">0.020</td>",
+          "<td class=\"number\">1.000</td><td class=\"number\">2.000</td>", "Over [mm]", "no run ended well", "pull: photograph",
+          "pull: hoop stress", "pull: straight", "other: wood of the model", "other: straight"})
         EXPECT_TRUE(contains(page, part)) << part;
     EXPECT_FALSE(contains(page, "other: hoop stress")) << "it has no path";
     // All over the whole, and each by itself; of the other experiment one path.
@@ -185,8 +192,7 @@ TEST(SystemReport, PageOfManyPhotographsStaysSmall) {
     picture.columns = picture.rows = 1600;
     std::mt19937 random(1);
     picture.gray.clear();
-    for (int i = 0; i < 1600 * 1600; ++i)
-        picture.gray.push_back(static_cast<std::uint8_t>(random()));
+    for (int i = 0; i < 1600 * 1600; ++i) picture.gray.push_back(static_cast<std::uint8_t>(random()));
     fit.crack_paths.resize(4, fit.crack_paths[0]);
     write(fit, command.path("fit.h5"));
     const std::string page = report(command, "fit.h5");
@@ -214,8 +220,7 @@ TEST(SlowReport, PageOfManyFineFramesStaysSmall) {
     Command command;
     Record record;
     constexpr int edge = 440;
-    for (int i = 0; i < edge * edge; ++i)
-        record.point_position.emplace_back(1e-4 * (i % edge), 1e-4 * (i / edge));
+    for (int i = 0; i < edge * edge; ++i) record.point_position.emplace_back(1e-4 * (i % edge), 1e-4 * (i / edge));
     record.point_latewood.assign(record.point_position.size(), 0.5f);
     std::mt19937 random(1);
     std::normal_distribution<float> stress(0, 1e6f);
@@ -223,8 +228,7 @@ TEST(SlowReport, PageOfManyFineFramesStaysSmall) {
         Frame& made = record.frames.emplace_back();
         made.time = frame;
         made.moved.assign(record.point_position.size(), Eigen::Vector2f::Zero());
-        for (std::size_t i = 0; i < record.point_position.size(); ++i)
-            made.stress.emplace_back(stress(random), 0, 0, 0);
+        for (std::size_t i = 0; i < record.point_position.size(); ++i) made.stress.emplace_back(stress(random), 0, 0, 0);
     }
     write(record, command.path("large.h5"));
     const std::string page = report(command, "large.h5");

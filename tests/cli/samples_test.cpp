@@ -17,8 +17,7 @@ Rows rows_of(const std::string& csv) {
     std::string line, field;
     std::getline(lines, line);
     std::vector<std::string> names;
-    for (std::istringstream head(line); std::getline(head, field, ',');)
-        names.push_back(field);
+    for (std::istringstream head(line); std::getline(head, field, ',');) names.push_back(field);
     Rows rows;
     while (std::getline(lines, line)) {
         std::istringstream fields(line);
@@ -64,7 +63,8 @@ TEST(SystemSamples, AllScenesExplainThemselves) {
         const Outcome outcome = command.run({"explain", std::string(SAMPLES "/") + scene + ".toml"});
         EXPECT_EQ(outcome.status, 0) << outcome.error;
         const bool slow = std::string(scene) == "wedge";  // at 1 mm/min, the others at 2 m/s
-        EXPECT_NE(outcome.out.find(slow ? "equilibrium, Newton's method" : "explicit dynamics"), std::string::npos) << outcome.out;
+        EXPECT_NE(outcome.out.find(slow ? "equilibrium, Newton's method" : "explicit dynamics"), std::string::npos)
+            << outcome.out;
     }
 }
 

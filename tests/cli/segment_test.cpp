@@ -18,8 +18,7 @@ const std::string picture = std::string(SAMPLES) + "/rings.png";  // 400 x 400 p
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;
     std::istringstream in(text);
-    for (std::string line; std::getline(in, line);)
-        lines.push_back(line);
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
     return lines;
 }
 
@@ -46,11 +45,11 @@ TEST(SystemSegment, PictureToTablesAndBackThroughEditedBorders) {
     // Without the first ring's border there is a ring less.
     std::string edited;
     for (const std::string& line : lines_of(borders.out))
-        if (line.rfind("1,", 0) != 0)
-            edited += line + '\n';
+        if (line.rfind("1,", 0) != 0) edited += line + '\n';
     command.folder.write("edited.csv", edited);
     const std::string again = command.path("again.h5");
-    const Outcome redone = command.run({"segment", picture, "-o", again, "--pixel", "25 um", "--borders", command.path("edited.csv")});
+    const Outcome redone =
+        command.run({"segment", picture, "-o", again, "--pixel", "25 um", "--borders", command.path("edited.csv")});
     ASSERT_EQ(redone.status, 0) << redone.error;
     EXPECT_EQ(lines_of(command.run({"csv", again, "rings"}).out).size() + 1, lines_of(rings.out).size());
 }
@@ -61,13 +60,12 @@ TEST(SystemSegment, ASceneStandsOnTheSpecimen) {
     std::ifstream sample(std::string(SAMPLES) + "/tension_tr_plus.toml");
     std::string scene;
     for (std::string line; std::getline(sample, line);) {
-        if (line.rfind("pixel =", 0) == 0 || line.rfind("classes =", 0) == 0 || line.rfind("between =", 0) == 0)
-            continue;
+        if (line.rfind("pixel =", 0) == 0 || line.rfind("classes =", 0) == 0 || line.rfind("between =", 0) == 0) continue;
         scene += (line.rfind("image =", 0) == 0 ? "file = \"s.h5\"" : line) + '\n';
     }
     command.folder.write("scene.toml", scene);
-    const Outcome run = command.run({"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--set", "model.cell=0.5 mm",
-                                     "--set", "edges.top.velocity=[\"0 m/s\", \"1 mm/min\"]"});
+    const Outcome run = command.run({"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--set",
+                                     "model.cell=0.5 mm", "--set", "edges.top.velocity=[\"0 m/s\", \"1 mm/min\"]"});
     ASSERT_EQ(run.status, 0) << run.error;
     const Record record = read_record(command.folder / "r.h5");
     const auto [low, high] = std::minmax_element(record.point_latewood.begin(), record.point_latewood.end());
@@ -115,7 +113,8 @@ TEST(SystemSegment, ScaleGraysAndDensityAsTold) {
     ASSERT_EQ(made.status, 0) << made.error;
     EXPECT_TRUE(contains(made.error, "25 um a pixel, from two points")) << made.error;
     const std::string table = command.folder.write("wedge.csv", "gray,density [kg/m^3]\n0,1200\n255,200\n").string();
-    const Outcome dense = command.run({"segment", "--gray", "EW 128-255", "--gray", "LW 0-127", picture, "-o", specimen, "--pixel", "25 um", "--density", table});
+    const Outcome dense = command.run({"segment", "--gray", "EW 128-255", "--gray", "LW 0-127", picture, "-o", specimen,
+                                       "--pixel", "25 um", "--density", table});
     ASSERT_EQ(dense.status, 0) << dense.error;
     EXPECT_TRUE(contains(dense.error, "density of LW")) << dense.error;
     EXPECT_EQ(read_specimen(specimen).density.size(), read_specimen(specimen).label.size());
@@ -126,7 +125,8 @@ TEST(SystemSegment, ScaleGraysAndDensityAsTold) {
         EXPECT_EQ(outcome.status, 2) << phrase;
         EXPECT_TRUE(contains(outcome.error, phrase)) << outcome.error;
     };
-    for (const char* bad : {"0,0 300,400", "0,0 300,400 = 12.5", "0,0 0,0 = 1 mm", "0,0 3 = 1 mm", "0,0 300,400 = -1 mm", "0,0 1e999,1 = 1 mm"})
+    for (const char* bad :
+         {"0,0 300,400", "0,0 300,400 = 12.5", "0,0 0,0 = 1 mm", "0,0 3 = 1 mm", "0,0 300,400 = -1 mm", "0,0 1e999,1 = 1 mm"})
         refused({"--scale", bad}, "--scale");
     refused({"--scale", "0,0 1,1 = 1 mm", "--pixel", "1 mm"}, "--pixel");
     for (const char* bad : {"EW", "EW 1", "EW 1-", "EW 1:2", "EW 1-2 3", "EW 200-100", "EW 0-256"})

@@ -58,12 +58,11 @@ TEST(SystemCommand, LocalSensitivityKnowsLinearFractureMechanics) {
     EXPECT_NEAR((elasticity[{"initial stiffness", "modulus"}]), 1, near);
     EXPECT_NEAR((elasticity[{"work of fracture", "toughness"}]), 1, near);
     EXPECT_NEAR((elasticity[{"work of fracture", "modulus"}]), 0, near);
-    const Outcome simulated = command.run({"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--quiet", "--set",
-                                           "materials.EW.E=50 MPa"});
+    const Outcome simulated = command.run(
+        {"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--quiet", "--set", "materials.EW.E=50 MPa"});
     ASSERT_EQ(simulated.status, 0);
     double peak = 0;
-    for (const Instant& instant : read_record(command.path("r.h5")).series)
-        peak = std::max(peak, instant.force);
+    for (const Instant& instant : read_record(command.path("r.h5")).series) peak = std::max(peak, instant.force);
     EXPECT_NEAR((derivative[{"peak force", "modulus"}]), 0.5 * peak / 50, 1e-6 * peak / 50);  // N for each MPa
     EXPECT_EQ(read_sensitivity(command.path("out.h5")).runs.size(), 1u);
 }
@@ -88,15 +87,15 @@ TEST(SystemCommand, KilledSensitivityGoesOnToTheSameBits) {
     command.folder.write("scene.toml", slow_scene());
     command.folder.write("study.toml", study);
     const auto words = [&](const std::string& output) {
-        return std::vector<std::string>{"sensitivity", command.path("study.toml"), "-o", command.path(output), "--quiet",
-                                        "--resume", "--set", "sensitivity.method=sobol", "--set", "sensitivity.samples=1024"};
+        return std::vector<std::string>{
+            "sensitivity", command.path("study.toml"), "-o",    command.path(output),      "--quiet", "--resume",
+            "--set",       "sensitivity.method=sobol", "--set", "sensitivity.samples=1024"};
     };
     std::size_t kept = 0;
     for (int i = 0; i < 3; ++i) {
         command.start(words("killed.h5"));
         const auto grown = [&] { return command.folder.read("killed.h5.runs").size() > kept + 300; };  // bytes: some runs
-        for (int wait = 0; wait < 6000 && !grown(); ++wait)
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        for (int wait = 0; wait < 6000 && !grown(); ++wait) std::this_thread::sleep_for(std::chrono::milliseconds(5));
         command.send(SIGKILL);
         EXPECT_EQ(command.finish().status, 128 + SIGKILL);
         EXPECT_FALSE(std::filesystem::exists(command.path("killed.h5")));
@@ -118,8 +117,8 @@ TEST(SystemCommand, SensitivityRefusesAFitWithoutDataAndUnknownOutputs) {
     const Outcome fit = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
     EXPECT_EQ(fit.status, 2);
     EXPECT_TRUE(contains(fit.error, "experiments")) << fit.error;
-    const Outcome outcome = command.run({"sensitivity", command.path("study.toml"), "-o", command.path("out.h5"), "--set",
-                                         "outputs=[\"peak farce\"]"});
+    const Outcome outcome = command.run(
+        {"sensitivity", command.path("study.toml"), "-o", command.path("out.h5"), "--set", "outputs=[\"peak farce\"]"});
     EXPECT_EQ(outcome.status, 2);
     EXPECT_TRUE(contains(outcome.error, "did you mean \"peak force\"?")) << outcome.error;
 }

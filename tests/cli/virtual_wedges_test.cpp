@@ -1,5 +1,5 @@
-// Virtual wedge tests, whose truth is known: how far off fits are, how often their intervals hold it, and whether it matters where they
-// start or that they are killed on the way. `scripts/virtual_wedges` runs more of them.
+// Virtual wedge tests, whose truth is known: how far off fits are, how often their intervals hold it, and whether it matters
+// where they start or that they are killed on the way. `scripts/virtual_wedges` runs more of them.
 #include "tests/cli/command.hpp"
 
 #include <gtest/gtest.h>
@@ -38,15 +38,14 @@ double after(const std::string& text, const std::string& words) {
 std::string without_seconds(const std::string& table) {
     std::istringstream lines(table);
     std::string kept, line;
-    while (std::getline(lines, line))
-        kept += line.substr(0, line.rfind(',')) + '\n';
+    while (std::getline(lines, line)) kept += line.substr(0, line.rfind(',')) + '\n';
     return kept;
 }
 
 }  // namespace
 
-// The truth lies on cells half as wide. Of intervals that hold it 95 times in a hundred, 5 or fewer of eight do six times in a thousand
-// (binomial: 0.0058).
+// The truth lies on cells half as wide. Of intervals that hold it 95 times in a hundred, 5 or fewer of eight do six times in a
+// thousand (binomial: 0.0058).
 TEST(SlowVirtualWedges, EightLinearTestsOnFinerCells) {
     Command command;
     const std::string told = virtual_wedges(command, "--scene opened --finer --count 8");
@@ -64,8 +63,8 @@ TEST(SlowVirtualWedges, TwentyStartsEndAtTheSamePlaceOrAHigherOne) {
     EXPECT_EQ(same + after(told, "ended at the same place, "), 20);
 }
 
-// Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is said to
-// lack something.
+// Two-valued wood does not explain wood that is graded from early to late. Of the fits of wood like the truth one in a hundred is
+// said to lack something.
 TEST(SlowVirtualWedges, WhatTheModelLacksIsSaid) {
     Command command;
     EXPECT_EQ(after(virtual_wedges(command, "--scene graded --count 4"), "lack of fit said: "), 4);
@@ -77,7 +76,8 @@ TEST(SlowVirtualWedges, KilledFitsEndAtTheSameBits) {
     Command command;
     virtual_wedges(command, "--scene wedge --count 1");
     const auto fit = [&](const std::string& output) {
-        return std::vector<std::string>{"fit", command.path("1/study.toml"), "-o", command.path(output), "--threads", "1", "--resume"};
+        return std::vector<std::string>{"fit",     command.path("1/study.toml"), "-o", command.path(output), "--threads", "1",
+                                        "--resume"};
     };
     ASSERT_EQ(command.run(fit("whole.h5")).status, 0);
     std::mt19937 generator(5);
@@ -92,7 +92,8 @@ TEST(SlowVirtualWedges, KilledFitsEndAtTheSameBits) {
     std::printf("%d of 20 were killed before their end\n", killed);
     EXPECT_GT(killed, 5);
     for (const char* table : {"parameters", "residuals", "correlation"})
-        EXPECT_EQ(command.run({"csv", command.path("killed.h5"), table}).out, command.run({"csv", command.path("whole.h5"), table}).out);
+        EXPECT_EQ(command.run({"csv", command.path("killed.h5"), table}).out,
+                  command.run({"csv", command.path("whole.h5"), table}).out);
     EXPECT_EQ(without_seconds(command.run({"csv", command.path("killed.h5"), "runs"}).out),
               without_seconds(command.run({"csv", command.path("whole.h5"), "runs"}).out));
     EXPECT_EQ(command.folder.read("killed.h5.runs").size(), command.folder.read("whole.h5.runs").size());

@@ -26,7 +26,8 @@ Curves load_record() {
     return load;
 }
 
-/// Pictures every 2 s of a camera whose clock starts `offset` s later on the load's and runs by `rate`, with noise on its channel.
+/// Pictures every 2 s of a camera whose clock starts `offset` s later on the load's and runs by `rate`, with noise on its
+/// channel.
 Curves camera_record(double offset, double rate, double noise) {
     std::mt19937 generator(3);
     std::normal_distribution<double> normal;
@@ -45,8 +46,8 @@ TEST(UnitClock, IsSetByASharedChannel) {
     const Curves images = camera_record(offset, rate, noise);
     const ClockSetting clock = set_clock(images, load_record(), {}, "times.csv");
     const double slope = 2.4;  // root mean square, roughly: 3 N/s and 2 N/s
-    std::printf("offset %.3f s (true %.2f), rate %.5f (true %.2f), misalignment %.3f s a picture\n", clock.offset, offset, clock.rate, rate,
-                *clock.misalignment);
+    std::printf("offset %.3f s (true %.2f), rate %.5f (true %.2f), misalignment %.3f s a picture\n", clock.offset, offset,
+                clock.rate, rate, *clock.misalignment);
     const double images_count = static_cast<double>(images.time.size());
     EXPECT_NEAR(clock.offset, offset, 4 * 2 * noise / slope / std::sqrt(images_count));
     EXPECT_NEAR(clock.rate, rate, 0.01);
@@ -72,19 +73,20 @@ TEST(UnitClock, IsSetAsTold) {
 
 TEST(UnitClock, AChannelThatSaysNothingIsRefused) {
     Curves images = camera_record(12, 1, 0), load = load_record();
-    for (double& force : load.force)
-        force = 5;
+    for (double& force : load.force) force = 5;
     EXPECT_THROW(set_clock(images, load, {}, "times.csv"), InputError);
 }
 
 TEST(UnitDensityTable, ReadsAndRefuses) {
     const TemporaryFolder folder;
-    const DensityTable table = read_density_table(folder.write("good.csv", "# wedge\ngray,density [g/cm^3]\n0,0\n100,0.4\n200,1.2\n"));
+    const DensityTable table =
+        read_density_table(folder.write("good.csv", "# wedge\ngray,density [g/cm^3]\n0,0\n100,0.4\n200,1.2\n"));
     EXPECT_DOUBLE_EQ(table.at(50), 200);
     EXPECT_DOUBLE_EQ(table.at(150), 800);
     EXPECT_DOUBLE_EQ(table.at(255), 1200);
-    for (const char* bad : {"", "gray,density [kg/m^3]\n1,1\n", "gray,density\n1,1\n2,2\n", "gray,density [mm]\n1,1\n2,2\n",
-                            "gray,density [kg/m^3]\n2,1\n1,2\n", "gray,density [kg/m^3]\n1,a\n2,2\n", "gray,density [kg/m^3]\n1,1\n2,-2\n",
-                            "gray,density [kg/m^3]\n1,1\n300,2\n", "gray,density [kg/m^3]\n1\n2\n", "x,density [kg/m^3]\n1,1\n2,2\n"})
+    for (const char* bad :
+         {"", "gray,density [kg/m^3]\n1,1\n", "gray,density\n1,1\n2,2\n", "gray,density [mm]\n1,1\n2,2\n",
+          "gray,density [kg/m^3]\n2,1\n1,2\n", "gray,density [kg/m^3]\n1,a\n2,2\n", "gray,density [kg/m^3]\n1,1\n2,-2\n",
+          "gray,density [kg/m^3]\n1,1\n300,2\n", "gray,density [kg/m^3]\n1\n2\n", "x,density [kg/m^3]\n1,1\n2,2\n"})
         EXPECT_THROW(read_density_table(folder.write("bad.csv", bad)), InputError) << bad;
 }

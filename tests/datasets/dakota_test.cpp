@@ -44,7 +44,8 @@ const std::string aprepro = R"(                    { DAKOTA_VARS     =          
 )";
 
 // Without labels, evaluation number and what comes after.
-const std::string old = "2 variables\n1.5 a\n-2e3 b\n1 functions\n1 ASV_1\n2 derivative_variables\n1 DVV_1\n2 DVV_2\n0 analysis_components\n";
+const std::string old =
+    "2 variables\n1.5 a\n-2e3 b\n1 functions\n1 ASV_1\n2 derivative_variables\n1 DVV_1\n2 DVV_2\n0 analysis_components\n";
 
 }  // namespace
 

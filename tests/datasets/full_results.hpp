@@ -34,8 +34,7 @@ inline std::vector<Vec2> some_points(std::size_t count) {
     std::mt19937_64 random(count);
     std::normal_distribution<double> normal;
     std::vector<Vec2> points(count);
-    for (Vec2& point : points)
-        point = {normal(random), normal(random)};
+    for (Vec2& point : points) point = {normal(random), normal(random)};
     return points;
 }
 
@@ -50,8 +49,7 @@ inline Record full_record() {
     CrackHistory crack;
     for (const double number : awkward_numbers()) {
         Instant instant;
-        for (const SeriesColumn& column : series_columns)
-            column.value(instant) = number;
+        for (const SeriesColumn& column : series_columns) column.value(instant) = number;
         instant.time = 1e-6 * static_cast<double>(record.series.size());
         record.series.push_back(instant);
         crack.length.push_back(number);
@@ -64,8 +62,7 @@ inline Record full_record() {
     record.reactions = {{"left/right wheel", some_points(record.series.size())}, {"Auflager ä", crack.tip}};
     for (const double number : awkward_numbers()) {
         CriticalLoad place;
-        for (const DrivingColumn& column : driving_columns)
-            place.*column.value = number;
+        for (const DrivingColumn& column : driving_columns) place.*column.value = number;
         place.tip = {-number, number};
         record.driving.push_back(place);
     }
@@ -75,8 +72,7 @@ inline Record full_record() {
         Frame frame{.time = 0.1 * i, .displacement = not_a_number, .moved = {}, .stress = {}, .crack = some_points(3)};
         for (const Vec2& point : record.point_position) {
             frame.moved.push_back(point.cast<float>() * static_cast<float>(i));
-            frame.stress.push_back(
-                {static_cast<float>(point.x()), std::numeric_limits<float>::infinity(), -0.0f, 1e-40f});
+            frame.stress.push_back({static_cast<float>(point.x()), std::numeric_limits<float>::infinity(), -0.0f, 1e-40f});
         }
         record.frames.push_back(frame);
     }
@@ -94,22 +90,25 @@ inline Fit full_fit() {
     fit.status = FitStatus::run_limit;
     fit.message = "max_runs was used up";
     fit.method = "ceres: few parameters";
-    fit.parameters = {{"EW, toughness", "materials.EW.toughness materials.ray.toughness", 103.25, "J/m^2", 1.0 / 3.0,
-                       -infinite, infinite, 80.0, false},
+    fit.parameters = {{"EW, toughness", "materials.EW.toughness materials.ray.toughness", 103.25, "J/m^2", 1.0 / 3.0, -infinite,
+                       infinite, 80.0, false},
                       {"LW \"hard\"", "materials.LW.toughness", not_a_number, "", 0.0, -0.0, 5e-324, 1.0, true}};
     fit.covariance = Eigen::MatrixXd{{1.0, 0.1}, {0.3, infinite}};
     fit.correlation = Eigen::MatrixXd{{1.0, -0.5}, {-0.25, 1.0}};
     fit.misfit = 12.75;
     fit.reduced_chi_square = 0.9;
-    fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5},
-                     {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
+    fit.residuals = {{"wedge 1", "force", 1e-4, 12.0, 12.5, 0.2, 2.5}, {"wedge 1", "arrival", 2e-3, not_a_number, 0, 1e-4, 0}};
     fit.runs = {{{80.0, 120.0}, infinite, "unstable", 0.5}, {{103.25, not_a_number}, 12.75, "finished", 0.625}};
     fit.distances = {{"wedge 1", "force", 1.0 / 3.0, 0.25, -0.0, not_a_number}};
     fit.models = {{"hoop stress", "converged", 1.0 / 3.0, {0.1, 0.2}, 4.3, 5.4, 0.9},
                   {"straight", "failed", infinite, {0.3, 0.4}, infinite, infinite, 0.0}};
-    fit.crack_paths = {{"wedge 1", true, {3, 2, {1, 2, 3, 4, 5, 255}, {-0.0, -1.0 / 3.0}, {0.1, 5e-324}}, some_points(3),
-                        {{"hoop stress", "finished", {some_points(2), {}}, 1.0 / 3.0, infinite, -0.0}, {"straight", "no run ended well", {}}}},
-                       {"block", false, {1, 1, {0}, {0, 0}, {1, 1}}, {}, {}}};
+    fit.crack_paths = {
+        {"wedge 1",
+         true,
+         {3, 2, {1, 2, 3, 4, 5, 255}, {-0.0, -1.0 / 3.0}, {0.1, 5e-324}},
+         some_points(3),
+         {{"hoop stress", "finished", {some_points(2), {}}, 1.0 / 3.0, infinite, -0.0}, {"straight", "no run ended well", {}}}},
+        {"block", false, {1, 1, {0}, {0, 0}, {1, 1}}, {}, {}}};
     fit.checks = {{"wedge 1", "force", 50, 12.5, 1.0 / 3.0, -0.0, not_a_number}};
     fit.profile = {{"EW, toughness", 80.5, infinite}, {"LW \"hard\"", -0.0, 1.0 / 3.0}};
     fit.posterior = {{{80.0, 1.0 / 3.0}, 12.75}, {{infinite, -0.0}, 13.0}};
@@ -138,8 +137,9 @@ inline Sensitivity full_sensitivity() {
     Sensitivity sensitivity;
     sensitivity.status = SensitivityStatus::interrupted;
     sensitivity.message = "2 of 3 runs failed";
-    sensitivity.parameters = {{"EW, toughness", "materials.EW.toughness materials.ray.toughness", "J/m^2", 80.0, 1.0 / 3.0, 400.0},
-                              {"nu", "materials.EW.nu", "", 0.3, -0.0, 0.4}};
+    sensitivity.parameters = {
+        {"EW, toughness", "materials.EW.toughness materials.ray.toughness", "J/m^2", 80.0, 1.0 / 3.0, 400.0},
+        {"nu", "materials.EW.nu", "", 0.3, -0.0, 0.4}};
     sensitivity.outputs = {{"peak force", "N"}, {"force at 0.5 mm", "N"}, {"arrest length 1", "m"}};
     sensitivity.indices = {{"peak force", "nu", "sobol", 0.25, -0.5, infinite, "first"},
                            {"peak force", "EW, toughness", "sobol", not_a_number, 5e-324, 1.0 / 3.0, "total"}};

@@ -73,9 +73,9 @@ class Mutator {
     }
 
     void replace_number(std::string& text) {
-        static constexpr std::array numbers{
-            "0",     "-1", "1e308", "1e-320",     "nan",  "-inf", "99999999999999999999", "0x7f", "1_0", "255", "0.5",
-            "1e999", "",   "25",    "1979-05-27", "true", "1e5 5"};
+        static constexpr std::array numbers{"0",          "-1",   "1e308", "1e-320", "nan",   "-inf", "99999999999999999999",
+                                            "0x7f",       "1_0",  "255",   "0.5",    "1e999", "",     "25",
+                                            "1979-05-27", "true", "1e5 5"};
         static constexpr const char* digits = "0123456789";
         const std::size_t begin = text.find_first_of(digits, below(text.size()));
         if (begin != std::string::npos) {
@@ -135,14 +135,12 @@ TEST(UnitFuzz, MutatedScenesAreReadOrRefused) {
 }
 
 TEST(UnitFuzz, OverridesAreTakenOrRefused) {
-    const std::array<std::string, 24> parts{
-        "model", "cell",   "edges",          "grip",    "0",      "velocity",
-        "1",     "bodies", "left wheel",     "circle",  "radius", "materials",
-        "EW",    "E",      "specimen",       "cutouts", "size",   "\"",
-        "'x'",   "",       "\"left wheel\"", "-1",      "title",  "99999999999999999999"};
-    const std::array<std::string, 12> values{
-        "1 mm",         "0",     "[1, 2]", "{ a = 1 }", "",  "\"5 m/s\"",
-        "x = 1\ny = 2", "\n[b]", "nan",    "\xff",      "'", "[\"1 mm\", \"2 mm\"]"};
+    const std::array<std::string, 24> parts{"model", "cell",   "edges",          "grip",    "0",      "velocity",
+                                            "1",     "bodies", "left wheel",     "circle",  "radius", "materials",
+                                            "EW",    "E",      "specimen",       "cutouts", "size",   "\"",
+                                            "'x'",   "",       "\"left wheel\"", "-1",      "title",  "99999999999999999999"};
+    const std::array<std::string, 12> values{"1 mm",         "0",     "[1, 2]", "{ a = 1 }", "",  "\"5 m/s\"",
+                                             "x = 1\ny = 2", "\n[b]", "nan",    "\xff",      "'", "[\"1 mm\", \"2 mm\"]"};
     std::mt19937 random(7);
     int refused = 0;
     for (int i = 0; i < 3000; ++i) {

@@ -15,7 +15,8 @@ using namespace crampfit;
 namespace {
 
 /// The InputError that `action` must throw.
-template <class Action> InputError error_of(const Action& action) {
+template <class Action>
+InputError error_of(const Action& action) {
     try {
         action();
     } catch (const InputError& error) {
@@ -69,8 +70,7 @@ TEST(UnitHdf5, FullDiskIsAnErrorAndChangesNothing) {
 
 TEST(UnitHdf5, FolderMustExistAndLetUsWrite) {
     const TemporaryFolder folder;
-    EXPECT_NE(message_of([&] { write(Record{}, folder / "none/record.h5"); }).find("does not exist"),
-              std::string::npos);
+    EXPECT_NE(message_of([&] { write(Record{}, folder / "none/record.h5"); }).find("does not exist"), std::string::npos);
     // Nobody, not even the superuser, makes files in /proc.
     EXPECT_NE(message_of([] { write(Record{}, "/proc/record.h5"); }).find("cannot be written"), std::string::npos);
 }

@@ -14,20 +14,19 @@ using namespace crampfit;
 
 namespace {
 
-template <class Value> bool same_bits(const std::vector<Value>& a, const std::vector<Value>& b) {
+template <class Value>
+bool same_bits(const std::vector<Value>& a, const std::vector<Value>& b) {
     return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Value)) == 0);
 }
 bool same_bits(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
     return a.rows() == b.rows() && a.cols() == b.cols() &&
-           same_bits(std::vector<double>(a.data(), a.data() + a.size()),
-                     std::vector<double>(b.data(), b.data() + b.size()));
+           same_bits(std::vector<double>(a.data(), a.data() + a.size()), std::vector<double>(b.data(), b.data() + b.size()));
 }
 bool same_bits(double a, double b) { return same_bits(std::vector<double>{a}, std::vector<double>{b}); }
 
 std::vector<double> values_of(std::vector<Instant> series, const SeriesColumn& column) {
     std::vector<double> values;
-    for (Instant& instant : series)
-        values.push_back(column.value(instant));
+    for (Instant& instant : series) values.push_back(column.value(instant));
     return values;
 }
 
@@ -129,7 +128,9 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
     };
     EXPECT_TRUE(same_bits(numbers(after.checks[0]), numbers(before.checks[0])));
     ASSERT_EQ(after.distances.size(), before.distances.size());
-    const auto distance = [](const CurveDistance& d) { return std::vector{d.area_measured, d.area_modelled, d.area_between, d.frechet}; };
+    const auto distance = [](const CurveDistance& d) {
+        return std::vector{d.area_measured, d.area_modelled, d.area_between, d.frechet};
+    };
     EXPECT_EQ(after.distances[0].kind, "force");
     EXPECT_TRUE(same_bits(distance(after.distances[0]), distance(before.distances[0])));
     ASSERT_EQ(after.models.size(), before.models.size());
@@ -152,7 +153,9 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
         EXPECT_TRUE(same_bits(a.photographed, b.photographed));
         ASSERT_EQ(a.simulated.size(), b.simulated.size());
         for (std::size_t k = 0; k < a.simulated.size(); ++k) {
-            const auto figures = [](const SimulatedPath& s) { return std::vector{s.mean_distance, s.largest_distance, s.compared_length}; };
+            const auto figures = [](const SimulatedPath& s) {
+                return std::vector{s.mean_distance, s.largest_distance, s.compared_length};
+            };
             EXPECT_EQ(a.simulated[k].model, b.simulated[k].model);
             EXPECT_EQ(a.simulated[k].status, b.simulated[k].status);
             EXPECT_TRUE(same_bits(figures(a.simulated[k]), figures(b.simulated[k])));
@@ -190,7 +193,8 @@ TEST(UnitHdf5, TrackComesBackBitForBit) {
     for (std::size_t i = 0; i < before.tips.size(); ++i) {
         const CrackTip &a = after.tips[i], &b = before.tips[i];
         EXPECT_EQ(a.status, b.status);
-        EXPECT_TRUE(same_bits(std::vector{a.tip.x(), a.tip.y(), a.angle, a.length, a.sigma}, std::vector{b.tip.x(), b.tip.y(), b.angle, b.length, b.sigma}));
+        EXPECT_TRUE(same_bits(std::vector{a.tip.x(), a.tip.y(), a.angle, a.length, a.sigma},
+                              std::vector{b.tip.x(), b.tip.y(), b.angle, b.length, b.sigma}));
         EXPECT_TRUE(same_bits(a.way, b.way)) << i;
     }
 }
@@ -199,8 +203,7 @@ TEST(UnitHdf5, TrackComesBackBitForBit) {
 TEST(UnitTrack, PathIsTheLastWayOrLeadsThroughTheTips) {
     CrackTrack track = full_track();
     EXPECT_TRUE(same_bits(path_of(track), track.tips[3].way));
-    for (CrackTip& tip : track.tips)
-        tip.way.clear();
+    for (CrackTip& tip : track.tips) tip.way.clear();
     track.tips[0].angle = 0;  // to the right
     const std::vector<Vec2> path = path_of(track);
     EXPECT_TRUE(same_bits(path, std::vector<Vec2>{{-20, 20}, {10, 20}, {11, 21}}));

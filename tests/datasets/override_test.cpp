@@ -14,8 +14,8 @@ Scene parse(const Overrides& overrides, const std::string& text = ring_scene) {
 }
 
 /// `blamed_key` and `blamed_value` where they are not those of the override itself.
-void expect_error(const std::string& key, const std::string& value, const std::string& phrase,
-                  const std::string& blamed_key = "", const std::string& blamed_value = "") {
+void expect_error(const std::string& key, const std::string& value, const std::string& phrase, const std::string& blamed_key = "",
+                  const std::string& blamed_value = "") {
     try {
         parse({{key, value}});
         FAIL() << key << " = " << value;
@@ -38,19 +38,15 @@ TEST(UnitOverride, KeysOfEveryKind) {
     EXPECT_DOUBLE_EQ(*parse({{"edges.grip.velocity", "[\"0 m/s\", \"1 m/s\"]"}}).edges[0].velocity[1], 1);
     EXPECT_DOUBLE_EQ(*parse({{"edges.grip.velocity.1", "2 m/s"}}).edges[0].velocity[1], 2);
     EXPECT_DOUBLE_EQ(*parse({{"edges.0.velocity.1", "3 m/s"}}).edges[0].velocity[1], 3);
-    EXPECT_DOUBLE_EQ(parse({{"edges.left.traction.0", "3 Pa"}}).edges[1].traction->x(), 3)
-        << "an edge named by its side";
+    EXPECT_DOUBLE_EQ(parse({{"edges.left.traction.0", "3 Pa"}}).edges[1].traction->x(), 3) << "an edge named by its side";
     EXPECT_DOUBLE_EQ(parse({{"bodies.left wheel.velocity.1", "4 m/s"}}).bodies[0].velocity.y(), 4);
     EXPECT_DOUBLE_EQ(parse({{"bodies.\"left wheel\".velocity.1", "5 m/s"}}).bodies[0].velocity.y(), 5);
     EXPECT_DOUBLE_EQ(parse({{"bodies.body 1.velocity.1", "6 m/s"}}).bodies[1].velocity.y(), 6);
     EXPECT_DOUBLE_EQ(parse({{"specimen.rings.period", "3 mm"}}).specimen.rings->period, 3e-3);
-    EXPECT_DOUBLE_EQ(std::get<Circle>(parse({{"specimen.cutouts.1.circle.radius", "2 mm"}}).specimen.cutouts[1]).radius,
-                     2e-3);
+    EXPECT_DOUBLE_EQ(std::get<Circle>(parse({{"specimen.cutouts.1.circle.radius", "2 mm"}}).specimen.cutouts[1]).radius, 2e-3);
     EXPECT_EQ(parse({{"output.frames", "1"}, {"output.frames", "2"}}).output.frames, 2) << "the last one counts";
-    const std::string dotted =
-        "[materials.\"EW 2.1\"]\nE = \"1 MPa\"\nnu = 0\ndensity = \"1 kg/m^3\"\ntoughness = \"1 J/m^2\"\n";
-    EXPECT_DOUBLE_EQ(
-        parse({{"materials.'EW 2.1'.E", "2 MPa"}}, ring_scene + dotted).materials.at("EW 2.1").youngs_modulus, 2e6);
+    const std::string dotted = "[materials.\"EW 2.1\"]\nE = \"1 MPa\"\nnu = 0\ndensity = \"1 kg/m^3\"\ntoughness = \"1 J/m^2\"\n";
+    EXPECT_DOUBLE_EQ(parse({{"materials.'EW 2.1'.E", "2 MPa"}}, ring_scene + dotted).materials.at("EW 2.1").youngs_modulus, 2e6);
 }
 
 TEST(UnitOverride, KeysThatTheFileDoesNotHave) {

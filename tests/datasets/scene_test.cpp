@@ -135,8 +135,8 @@ TEST(UnitScene, Picture) {
 
 TEST(UnitScene, SpecimenFile) {
     const SceneFolder folder;
-    const std::string text = replaced(plain_scene, "material = \"EW\"",
-                                      "file = \"specimen.h5\"\noffset = [\"1 mm\", \"0 mm\"]\nrotation = \"1 rad\"");
+    const std::string text =
+        replaced(plain_scene, "material = \"EW\"", "file = \"specimen.h5\"\noffset = [\"1 mm\", \"0 mm\"]\nrotation = \"1 rad\"");
     const Scene scene = folder.parse(text);
     EXPECT_EQ(scene.specimen.file, folder / "specimen.h5");
     EXPECT_DOUBLE_EQ(scene.specimen.file_offset.x(), 1e-3);
@@ -150,8 +150,7 @@ TEST(UnitScene, Defaults) {
     EXPECT_EQ(scene.model.points_per_cell, 4);
     EXPECT_EQ(scene.edges[0].name, "bottom");
     EXPECT_EQ(scene.measure.force, "top") << "the edge under traction, since none moves";
-    EXPECT_EQ(folder.parse(picture_scene).measure.displacement, "top")
-        << "the edge that moves, not the one that is held";
+    EXPECT_EQ(folder.parse(picture_scene).measure.displacement, "top") << "the edge that moves, not the one that is held";
     const std::string crack = "\n[[cracks]]\npoints = [[\"0 mm\", \"5 mm\"], [\"2 mm\", \"5 mm\"]]\n";
     const Scene cracked = folder.parse(plain_scene + crack);
     EXPECT_EQ(cracked.cracks[0].grows, Growth::none);
@@ -181,7 +180,8 @@ TEST(UnitScene, Updates) {
     const auto with = [](const std::string& keys) { return plain_scene + "\n[solver]\n" + keys + "\n"; };
     EXPECT_EQ(folder.parse(plain_scene).solver.velocity_update, VelocityUpdate::automatic);
     EXPECT_EQ(folder.parse(plain_scene).solver.stress_update, StressUpdate::last);
-    const SolverChoice flip = folder.parse(with("velocity_update = \"flip\"\npic_share = \"5 %\"\nstress_update = \"first\"")).solver;
+    const SolverChoice flip =
+        folder.parse(with("velocity_update = \"flip\"\npic_share = \"5 %\"\nstress_update = \"first\"")).solver;
     EXPECT_EQ(flip.velocity_update, VelocityUpdate::flip);
     EXPECT_DOUBLE_EQ(flip.pic_share, 0.05);
     EXPECT_EQ(flip.stress_update, StressUpdate::first);
@@ -207,12 +207,16 @@ TEST(UnitScene, Updates) {
 // Pieces that start with a velocity need no edge, but then a time to stop at.
 TEST(UnitScene, Parts) {
     const SceneFolder folder;
-    const std::string parts = "parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, velocity = [\"5 m/s\", \"0 m/s\"] },\n"
-                              "          { polygon = [[\"6 mm\", \"1 mm\"], [\"9 mm\", \"1 mm\"], [\"9 mm\", \"5 mm\"]] } ]\n";
+    const std::string parts =
+        "parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, velocity = [\"5 m/s\", \"0 m/s\"] },\n"
+        "          { polygon = [[\"6 mm\", \"1 mm\"], [\"9 mm\", \"1 mm\"], [\"9 mm\", \"5 mm\"]] } ]\n";
     const auto scene = [&](const std::string& more, const std::string& stop) {
         return "[model]\nplane = \"strain\"\nthickness = \"1 mm\"\ncell = \"0.5 mm\"\n[specimen]\nsize = [\"10 mm\", \"6 mm\"]\n"
-               "material = \"EW\"\n" + more + "[materials.EW]\nE = \"40 MPa\"\nnu = 0.3\ndensity = \"300 kg/m^3\"\n"
-               "toughness = \"100 J/m^2\"\n[stop]\n" + stop + "\n";
+               "material = \"EW\"\n" +
+               more +
+               "[materials.EW]\nE = \"40 MPa\"\nnu = 0.3\ndensity = \"300 kg/m^3\"\n"
+               "toughness = \"100 J/m^2\"\n[stop]\n" +
+               stop + "\n";
     };
     const Scene two = folder.parse(scene(parts, "time = \"1 ms\""));
     ASSERT_EQ(two.specimen.parts.size(), 2u);
@@ -222,7 +226,8 @@ TEST(UnitScene, Parts) {
     const std::string file = (folder / "scene.toml").string();
     expect_error(file, "stop", "by time alone", [&] { folder.parse(scene(parts, "displacement = \"1 mm\"")); });
     expect_error(file, "specimen.parts.0.speed", "unknown key", [&] {
-        folder.parse(scene("parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, speed = 1 } ]\n", "time = \"1 ms\""));
+        folder.parse(scene("parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" }, speed = 1 } ]\n",
+                           "time = \"1 ms\""));
     });
     expect_error(file, "measure.force", "nothing loads the specimen", [&] {
         folder.parse(scene("parts = [ { circle = { centre = [\"3 mm\", \"3 mm\"], radius = \"2 mm\" } } ]\n", "time = \"1 ms\""));
@@ -327,8 +332,7 @@ TEST(UnitScene, UnitsAndTypes) {
         {ring_scene, "[measure]", "[[measure]]", "measure", "must be a table"},
         {ring_scene, "[[edges]]\nname = \"grip\"", "[edges]\nname = \"grip\"", "", "cannot redefine"},
         {ring_scene, "[[cracks]]\npoints = [[\"10", "[cracks]\n[cracks.x]\n#", "", "cannot redefine"},
-        {plain_scene, "material = \"EW\"", "material = \"EW\"\ncutouts = { a = 1 }", "specimen.cutouts",
-         "must be a list"},
+        {plain_scene, "material = \"EW\"", "material = \"EW\"\ncutouts = { a = 1 }", "specimen.cutouts", "must be a list"},
         {plain_scene, "[[edges]]\nside = \"top\"", "[bodies]\nside = \"top\"", "bodies", "must be a list"},
         {picture_scene, "\"30 deg\"", "30", "specimen.rotation", "missing unit: expected an angle"},
         {picture_scene, "\"30 deg\"", "\"30 %\"", "specimen.rotation", "expected an angle"},
@@ -350,12 +354,10 @@ TEST(UnitScene, ImpossibleValues) {
         {ring_scene, "radius = \"1 mm\" }\ncontact", "radius = \"-1 mm\" }\ncontact", "bodies.left wheel.circle.radius",
          "greater than 0"},
         {ring_scene, "[\"6 mm\", \"20 mm\"], ", "", "specimen.cutouts.0.polygon", "at least 3 points"},
-        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"5 mm\", \"20 mm\"]", "specimen.cutouts.0.polygon",
-         "must have an area"},
-        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"4 mm\", \"20 mm\"]", "specimen.cutouts.0.polygon",
-         "repeats its neighbour"},
-        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"4 mm\", \"17 mm\"], [\"7 mm\", \"18 mm\"]",
-         "specimen.cutouts.0.polygon", "must not cross"},
+        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"5 mm\", \"20 mm\"]", "specimen.cutouts.0.polygon", "must have an area"},
+        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"4 mm\", \"20 mm\"]", "specimen.cutouts.0.polygon", "repeats its neighbour"},
+        {ring_scene, "[\"5 mm\", \"17 mm\"]", "[\"4 mm\", \"17 mm\"], [\"7 mm\", \"18 mm\"]", "specimen.cutouts.0.polygon",
+         "must not cross"},
         {ring_scene, "E = \"40 MPa\"", "E = \"0 MPa\"", "materials.EW.E", "greater than 0"},
         {ring_scene, "nu = 0.33", "nu = 0.5", "materials.EW.nu", "between -1 and 0.5"},
         {ring_scene, "nu = 0.33", "nu = -1", "materials.EW.nu", "between -1 and 0.5"},
@@ -382,8 +384,8 @@ TEST(UnitScene, ImpossibleValues) {
          "cracks.0.points", "must not cross"},
         {ring_scene, "[\"7.5 mm\", \"5 mm\"]", "[\"7.5 mm\", \"5 mm\"], [\"8 mm\", \"5 mm\"]", "cracks.0.points",
          "must not cross"},
-        {ring_scene, "[[\"10 mm\", \"5 mm\"], [\"7.5 mm\", \"5 mm\"]]",
-         "[[\"12 mm\", \"5 mm\"], [\"11 mm\", \"5 mm\"]]", "cracks.0.points", "outside the specimen"},
+        {ring_scene, "[[\"10 mm\", \"5 mm\"], [\"7.5 mm\", \"5 mm\"]]", "[[\"12 mm\", \"5 mm\"], [\"11 mm\", \"5 mm\"]]",
+         "cracks.0.points", "outside the specimen"},
         {ring_scene, "advance = \"0.1 mm\"", "advance = \"-0.1 mm\"", "cracks.0.advance", "must not be negative"},
         {ring_scene, "\"2e4 1/s\"", "\"-2e4 1/s\"", "solver.damping", "must not be negative"},
         {ring_scene, "displacement = \"0.5 mm\"", "displacement = \"0 mm\"", "stop.displacement", "greater than 0"},
@@ -395,8 +397,7 @@ TEST(UnitScene, ImpossibleValues) {
         {picture_scene, "[128, 255]", "[128, 256]", "specimen.classes.0.gray.1", "from 0 to 255"},
         {picture_scene, "[128, 255]", "[-1, 255]", "specimen.classes.0.gray.0", "from 0 to 255"},
         {picture_scene, "[128, 255]", "[255, 128]", "specimen.classes.0.gray", "reversed"},
-        {picture_scene, "[0, 100]", "[0, 128]", "specimen.classes.1.gray",
-         "overlaps the range 128..255 of material EW"},
+        {picture_scene, "[0, 100]", "[0, 128]", "specimen.classes.1.gray", "overlaps the range 128..255 of material EW"},
         {picture_scene, "{ material = \"EW\", gray = [128, 255] }, { material = \"LW\", gray = [0, 100] }", "",
          "specimen.classes", "at least one class"},
     });
@@ -409,14 +410,12 @@ TEST(UnitScene, UnknownWordsAndReferences) {
         {ring_scene, "side = \"top\"", "side = \"up\"", "edges.grip.side", "must be one of \"top\", \"bottom\""},
         {ring_scene, "\"bonded\"", "\"glued\"", "bodies.body 1.contact", "must be one of"},
         {ring_scene, "grows = \"end\"", "grows = \"yes\"", "cracks.0.grows", "must be one of"},
-        {ring_scene, "\"energy release rate\"", "\"stress\"", "cracks.0.criterion",
-         "must be one of \"energy release rate\""},
+        {ring_scene, "\"energy release rate\"", "\"stress\"", "cracks.0.criterion", "must be one of \"energy release rate\""},
         {ring_scene, "\"hoop stress\"", "\"hoop\"", "cracks.0.direction", "must be one of"},
         {ring_scene, "\"stick\"", "\"sticky\"", "cracks.1.faces", "did you mean \"stick\"?"},
         {ring_scene, "\"explicit\"", "\"implicit\"", "solver.kind", "did you mean \"explicit\"?"},
         {ring_scene, "\"gimp\"", "\"gmp\"", "solver.shape_function", "did you mean \"gimp\"?"},
-        {ring_scene, "force = \"left wheel\"", "force = \"left weel\"", "measure.force",
-         "did you mean \"left wheel\"?"},
+        {ring_scene, "force = \"left wheel\"", "force = \"left weel\"", "measure.force", "did you mean \"left wheel\"?"},
         {ring_scene, "displacement = \"grip\"", "displacement = \"roof\"", "measure.displacement", "no edge or body"},
         {ring_scene, "[materials.LW]", "[materials.Latewood]", "specimen.rings", "there is no [materials.LW]"},
         {plain_scene, "material = \"EW\"", "material = \"Ew\"", "specimen.material", "did you mean \"EW\"?"},
@@ -431,8 +430,7 @@ TEST(UnitScene, UnknownWordsAndReferences) {
 
 TEST(UnitScene, KeysThatDoNotGoTogether) {
     expect_errors({
-        {plain_scene, "material = \"EW\"", "material = \"EW\"\nimage = \"block.png\"", "specimen.image",
-         "\"material\" already"},
+        {plain_scene, "material = \"EW\"", "material = \"EW\"\nimage = \"block.png\"", "specimen.image", "\"material\" already"},
         {plain_scene, "material = \"EW\"", "material = \"EW\"\npixel = \"1 um\"", "specimen.pixel", "needs an image"},
         {plain_scene, "material = \"EW\"", "material = \"EW\"\noffset = [\"0 mm\", \"0 mm\"]", "specimen.offset",
          "needs an image or a file"},
@@ -441,11 +439,9 @@ TEST(UnitScene, KeysThatDoNotGoTogether) {
         {plain_scene, "material = \"EW\"", "material = \"EW\"\nclasses = []", "specimen.classes", "needs an image"},
         {plain_scene, "material = \"EW\"", "material = \"EW\"\norientation = \"angles.png\"", "specimen.orientation",
          "needs an image"},
-        {plain_scene, "material = \"EW\"", "file = \"specimen.h5\"\nbetween = \"graded\"", "specimen.between",
-         "needs an image"},
+        {plain_scene, "material = \"EW\"", "file = \"specimen.h5\"\nbetween = \"graded\"", "specimen.between", "needs an image"},
         {ring_scene, "{ circle =", "{ polygon = [], circle =", "specimen.cutouts.1", "give one of circle and polygon"},
-        {ring_scene, "until = \"1 ms\"", "traction = [\"0 MPa\", \"0 MPa\"]", "edges.grip",
-         "give one of velocity and traction"},
+        {ring_scene, "until = \"1 ms\"", "traction = [\"0 MPa\", \"0 MPa\"]", "edges.grip", "give one of velocity and traction"},
         {ring_scene, "\"1 MPa\"]", "\"1 MPa\"]\nuntil = \"1 ms\"", "edges.left.until", "belongs to a velocity"},
         {ring_scene, "side = \"left\"", "name = \"grip\"\nside = \"left\"", "edges.grip.name", "is taken"},
         {ring_scene, "name = \"left wheel\"", "name = \"grip\"", "bodies.grip.name", "is taken"},
@@ -477,18 +473,24 @@ TEST(UnitScene, OrthotropicWood) {
     EXPECT_FALSE(exponents.E);
     // In plane stress the constants along L may be left out.
     const std::string stress = replaced(orthotropic_scene, "\"strain\"", "\"stress\"");
-    EXPECT_EQ(folder.parse(replaced(stress, "E_L = \"11 GPa\"\nnu_LR = 0.4\nnu_LT = 0.45\n", "")).materials.at("EW").orthotropic->E_L, 0);
+    EXPECT_EQ(
+        folder.parse(replaced(stress, "E_L = \"11 GPa\"\nnu_LR = 0.4\nnu_LT = 0.45\n", "")).materials.at("EW").orthotropic->E_L,
+        0);
     // A direction for wood without rings.
-    const std::string rings = orthotropic_scene.substr(orthotropic_scene.find("rings"), orthotropic_scene.find("density_exp") - orthotropic_scene.find("rings"));
-    EXPECT_DOUBLE_EQ(*folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\nradial = \"90 deg\"\n")).specimen.radial, M_PI / 2);
-    EXPECT_DOUBLE_EQ(folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\npith = [\"1 m\", \"2 m\"]\n")).specimen.pith->y(), 2);
+    const std::string rings = orthotropic_scene.substr(orthotropic_scene.find("rings"),
+                                                       orthotropic_scene.find("density_exp") - orthotropic_scene.find("rings"));
+    EXPECT_DOUBLE_EQ(
+        *folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\nradial = \"90 deg\"\n")).specimen.radial, M_PI / 2);
+    EXPECT_DOUBLE_EQ(
+        folder.parse(replaced(orthotropic_scene, rings, "material = \"EW\"\npith = [\"1 m\", \"2 m\"]\n")).specimen.pith->y(), 2);
     expect_errors({
         {orthotropic_scene, "E_R = \"800 MPa\"", "E_R = \"0 MPa\"", "materials.EW.E_R", "greater than 0"},
         {orthotropic_scene, "G_RT = \"40 MPa\"\n", "", "materials.EW.G_RT", "missing key"},
         {orthotropic_scene, "E_L = \"11 GPa\"\n", "", "materials.EW.E_L", "missing key"},
         {orthotropic_scene, "nu_RT", "nu_TR", "materials.EW.nu_TR", "give nu_RT = nu_TR E_R / E_T instead"},
         {orthotropic_scene, "G_RT", "E", "materials.EW.E", "unknown key"},
-        {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.4143", "materials.EW.nu_RT", "between -1.414 and 1.414, the root of E_R / E_T"},
+        {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.4143", "materials.EW.nu_RT",
+         "between -1.414 and 1.414, the root of E_R / E_T"},
         {orthotropic_scene, "nu_LR = 0.4", "nu_LR = -3.8", "materials.EW.nu_LR", "the root of E_L / E_R"},
         {orthotropic_scene, "nu_LT = 0.45", "nu_LT = 5.3", "materials.EW.nu_LT", "the root of E_L / E_T"},
         {orthotropic_scene, "nu_RT = 0.45", "nu_RT = 1.413", "materials.EW.nu_RT", "too large together"},
@@ -513,8 +515,8 @@ TEST(UnitScene, OrthotropicConstantsAreNumbersThatAFitMayAdjust) {
     EXPECT_DOUBLE_EQ(scene.specimen.density_exponents.E_T, 3);
     EXPECT_THROW(set_number(scene, "materials.EW.E", 1e6), InputError);
     EXPECT_THROW(set_number(scene, "specimen.density_exponents.E", 1), InputError);  // not given: no number there
-    EXPECT_THROW(set_number(scene, "materials.EW.E_T", 1e10), InputError);          // breaks the limit of nu_RT
-    EXPECT_DOUBLE_EQ(scene.materials.at("EW").orthotropic->E_T, 404e6);             // and left as it was
+    EXPECT_THROW(set_number(scene, "materials.EW.E_T", 1e10), InputError);           // breaks the limit of nu_RT
+    EXPECT_DOUBLE_EQ(scene.materials.at("EW").orthotropic->E_T, 404e6);              // and left as it was
 }
 
 TEST(UnitScene, NotSupportedYet) {
@@ -552,7 +554,8 @@ TEST(UnitScene, WoodThatRemembers) {
     set_number(scene, "materials.LW.yield_stress", 2.5e6);
     EXPECT_THROW(set_number(scene, "materials.LW.yield_stress", 3.5e6), InputError);  // above the saturation stress
     EXPECT_EQ(scene.materials.at("LW").plastic->yield_stress, 2.5e6);
-    EXPECT_EQ(folder.parse(replaced(remembering_scene, "hardening = \"5 MPa\"\n", "")).materials.at("LW").plastic->hardening, 0.0);
+    EXPECT_EQ(folder.parse(replaced(remembering_scene, "hardening = \"5 MPa\"\n", "")).materials.at("LW").plastic->hardening,
+              0.0);
 
     const std::string& all = remembering_scene;
     expect_errors({
@@ -564,8 +567,10 @@ TEST(UnitScene, WoodThatRemembers) {
         {all, "\"1 s\"", "1", "materials.EW.prony.0.tau", ""},
         {all, ", tau = \"1 s\"", "", "materials.EW.prony.0.tau", "missing"},
         {all, "g = 0.2,", "g = 0.2, G = 0.1,", "materials.EW.prony.0.G", ""},
-        {all, "prony = [ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "", "materials.EW.prony", "missing"},
-        {all, "[ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "[]", "materials.EW.prony", "at least one"},
+        {all, "prony = [ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "", "materials.EW.prony",
+         "missing"},
+        {all, "[ { g = 0.2, tau = \"1 s\" }, { g = 0.3, k = 0.1, tau = \"2 min\" } ]", "[]", "materials.EW.prony",
+         "at least one"},
         {all, "prony =", "yield_stress = \"1 MPa\"\nprony =", "materials.EW.yield_stress", ""},
         {all, "\"2 MPa\"", "\"-2 MPa\"", "materials.LW.yield_stress", "greater than 0"},
         {all, "yield_stress = \"2 MPa\"\n", "", "materials.LW.yield_stress", "missing"},
@@ -617,7 +622,10 @@ TEST(UnitScene, FacesThatATractionPullsTogether) {
     EXPECT_DOUBLE_EQ(scene.cracks[0].faces.bridging->opening, 1e-4);
     EXPECT_FALSE(scene.cracks[0].faces.bridging->on_all_faces);
     EXPECT_FALSE(scene.cracks[1].faces.bridging);
-    EXPECT_TRUE(SceneFolder().parse(replaced(text, "\"0.1 mm\" } }", "\"0.1 mm\", on = \"all faces\" } }")).cracks[0].faces.bridging->on_all_faces);
+    EXPECT_TRUE(SceneFolder()
+                    .parse(replaced(text, "\"0.1 mm\" } }", "\"0.1 mm\", on = \"all faces\" } }"))
+                    .cracks[0]
+                    .faces.bridging->on_all_faces);
     set_number(scene, "cracks.0.faces.traction.stress", 3e6);
     EXPECT_EQ(scene.cracks[0].faces.bridging->stress, 3e6);
     EXPECT_THROW(set_number(scene, "cracks.0.faces.traction.opening", 0.0), InputError);

@@ -178,7 +178,8 @@ TEST(UnitStudy, ModelsToCompare) {
     EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").density, 333);
 }
 
-// A picture of 400 x 200 pixels of 50 um, turned by a quarter about its lower left corner at 12, 1 mm: up the picture is to the left.
+// A picture of 400 x 200 pixels of 50 um, turned by a quarter about its lower left corner at 12, 1 mm: up the picture is to the
+// left.
 TEST(UnitStudy, PhotographOfACrack) {
     const StudyFolder folder;
     const auto with = [](const std::string& photograph) {
@@ -193,7 +194,8 @@ TEST(UnitStudy, PhotographOfACrack) {
     track.tips = {{.status = TipStatus::ok, .tip = {149.5, 99.5}, .way = {{-0.5, 99.5}, {149.5, 99.5}}}};
     write(track, folder / "track.h5");
     folder.write("last.png", "");  // read later
-    const Study study = folder.read(with(R"({ picture = "last.png", track = "track.h5", offset = ["12 mm", "1 mm"], rotation = "90 deg" })"));
+    const Study study =
+        folder.read(with(R"({ picture = "last.png", track = "track.h5", offset = ["12 mm", "1 mm"], rotation = "90 deg" })"));
     ASSERT_TRUE(study.experiments[0].photograph);
     EXPECT_FALSE(study.experiments[1].photograph);
     const Photograph& photograph = *study.experiments[0].photograph;
@@ -203,7 +205,8 @@ TEST(UnitStudy, PhotographOfACrack) {
     EXPECT_NEAR((photograph.path[1] - Vec2(7e-3, 8.5e-3)).norm(), 0, 1e-12);
 
     const auto refused = [&](const std::string& photograph_of, const std::string& key, const std::string& phrase) {
-        expect_error((folder / "study.toml").string(), "experiments.wedge 1.photograph" + key, phrase, [&] { folder.read(with(photograph_of)); });
+        expect_error((folder / "study.toml").string(), "experiments.wedge 1.photograph" + key, phrase,
+                     [&] { folder.read(with(photograph_of)); });
     };
     refused("{ }", ".picture", "missing");
     refused(R"({ picture = "last.png" })", "", "edge of a pixel");
@@ -240,8 +243,7 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"\"200 mN\"", "\"200 mm\"", "experiments.wedge 1.noise.force", "wrong dimension"},
         {"\"200 mN\"", "0.2", "experiments.wedge 1.noise.force", "missing unit"},
         {"\"200 mN\"", "\"0 N\"", "experiments.wedge 1.noise.force", "greater than 0"},
-        {"noise = { force = \"200 mN\"", "noise = { time = \"1 s\"", "experiments.wedge 1.noise.time",
-         "no such column"},
+        {"noise = { force = \"200 mN\"", "noise = { time = \"1 s\"", "experiments.wedge 1.noise.time", "no such column"},
         {"weight = 2.0", "weight = 0", "experiments.wedge 1.weight", "greater than 0"},
         {"scene = \"plain.toml\"", "name = \"wedge 1\"\nscene = \"plain.toml\"", "experiments.wedge 1", "is taken"},
         {"key = \"materials.EW.toughness\"", "", "parameters.EW toughness", "give one of key and keys"},
@@ -249,16 +251,14 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
          "did you mean \"toughness\"?"},
         {"key = \"materials.EW.toughness\"", "key = \"materials.XX.toughness\"", "parameters.EW toughness.key",
          "there is no material XX"},
-        {"[\"materials.EW.E\", \"materials.LW.E\"]", "[\"materials.EW.E\", \"materials.LW.nu\"]",
-         "parameters.stiffness.keys.1", "one dimension"},
+        {"[\"materials.EW.E\", \"materials.LW.E\"]", "[\"materials.EW.E\", \"materials.LW.nu\"]", "parameters.stiffness.keys.1",
+         "one dimension"},
         {"[\"materials.EW.E\", \"materials.LW.E\"]", "[]", "parameters.stiffness.keys", "at least one key"},
         {"initial = \"80 J/m^2\"", "initial = 80", "parameters.EW toughness.initial", "missing unit"},
         {"initial = \"80 J/m^2\"", "initial = \"80 MPa\"", "parameters.EW toughness.initial", "wrong dimension"},
         {"initial = \"80 J/m^2\"", "", "parameters.EW toughness.initial", "missing key"},
-        {"initial = \"80 J/m^2\"", "initial = \"10 J/m^2\"", "parameters.EW toughness.initial",
-         "between lower and upper"},
-        {"initial = \"80 J/m^2\"", "initial = \"500 J/m^2\"", "parameters.EW toughness.initial",
-         "between lower and upper"},
+        {"initial = \"80 J/m^2\"", "initial = \"10 J/m^2\"", "parameters.EW toughness.initial", "between lower and upper"},
+        {"initial = \"80 J/m^2\"", "initial = \"500 J/m^2\"", "parameters.EW toughness.initial", "between lower and upper"},
         {"upper = \"400 N/m\"", "upper = \"20 J/m^2\"", "parameters.EW toughness.lower", "less than upper"},
         {"lower = \"0.02 kJ/m^2\"", "lower = \"0 J/m^2\"", "parameters.EW toughness.lower", "greater than 0"},
         {"upper = 0.4", "upper = 0.5\nscale = \"linear\"", "parameters.2.upper", "between -1 and 0.5"},
@@ -268,8 +268,7 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"mean = \"100 J/m^2\", ", "", "parameters.EW toughness.prior.mean", "missing"},
         {"name = \"stiffness\"", "name = \"EW toughness\"", "parameters.EW toughness", "is taken"},
         {"key = \"materials.EW.nu\"", "key = \"materials.EW.E\"", "parameters.2.initial", "missing unit"},
-        {"keys = [\"materials.EW.E\"", "keys = [\"materials.EW.toughness\"", "parameters.stiffness.keys.1",
-         "one dimension"},
+        {"keys = [\"materials.EW.E\"", "keys = [\"materials.EW.toughness\"", "parameters.stiffness.keys.1", "one dimension"},
         {"\"bobyqa\"", "\"bobyka\"", "optimizer.method", "did you mean \"bobyqa\"?"},
         {"starts = 4", "starts = 0", "optimizer.starts", "whole number from 1"},
         {"max_runs = 200", "max_runs = 0", "optimizer.max_runs", "whole number from 1"},
@@ -287,19 +286,26 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"title =", "outputs = [\"peak force\", \"peak force\"]\ntitle =", "outputs.1", "asked for twice"},
         {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "either a scene or experiments"},
         {"[optimizer]", "[optimizer]\nloss = \"huper\"", "optimizer.loss", "did you mean \"huber\"?"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\"]\n[optimizer]", "compare.values", "at least two"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 mm\"]\n[optimizer]", "compare.values.1", "wrong dimension"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 MPa\"]\n[optimizer]", "compare.values.1", "given twice"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\"]\n[optimizer]", "compare.values",
+         "at least two"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 mm\"]\n[optimizer]", "compare.values.1",
+         "wrong dimension"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 MPa\"]\n[optimizer]", "compare.values.1",
+         "given twice"},
         {"[optimizer]", "[compare]\nvalues = [\"1 MPa\", \"2 MPa\"]\n[optimizer]", "compare.key", "missing"},
         {"weight = 2.0", "compliance = \"0.1 mm\"", "experiments.wedge 1.compliance", "wrong dimension"},
         {"weight = 2.0", "compliance = \"-1 um/N\"", "experiments.wedge 1.compliance", "not be negative"},
         {"weight = 2.0", "force_offset = 0.1", "experiments.wedge 1.force_offset", "missing unit"},
-        {"data = \"plain.csv\"", "data = \"plain.csv\"\ncompliance = \"1 um/N\"", "experiments.experiment 1.compliance", "no such column"},
+        {"data = \"plain.csv\"", "data = \"plain.csv\"\ncompliance = \"1 um/N\"", "experiments.experiment 1.compliance",
+         "no such column"},
         {"key = \"materials.EW.nu\"", "key = \"experiments.wedge 2.compliance\"", "parameters.2.key", "did you mean \"wedge 1\""},
-        {"key = \"materials.EW.nu\"", "key = \"experiments.wedge 1.complianze\"", "parameters.2.key", "did you mean \"compliance\""},
-        {"key = \"materials.EW.nu\"", "key = \"experiments.1.displacement_offset\"", "parameters.2.key", "no displacement column"},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.wedge 1.complianze\"", "parameters.2.key",
+         "did you mean \"compliance\""},
+        {"key = \"materials.EW.nu\"", "key = \"experiments.1.displacement_offset\"", "parameters.2.key",
+         "no displacement column"},
         {"key = \"materials.EW.nu\"", "key = \"experiments.0\"", "parameters.2.key", "must be experiments.NAME"},
-        {"initial = \"50 MPa\"", "factors = [1]\ninitial = \"50 MPa\"", "parameters.stiffness.factors", "as many as the keys: 2, not 1"},
+        {"initial = \"50 MPa\"", "factors = [1]\ninitial = \"50 MPa\"", "parameters.stiffness.factors",
+         "as many as the keys: 2, not 1"},
         {"initial = \"50 MPa\"", "factors = [1, 0]\ninitial = \"50 MPa\"", "parameters.stiffness.factors.1", "must not be 0"},
         {"initial = \"50 MPa\"", "factors = [1, -2]\ninitial = \"50 MPa\"", "parameters.stiffness.initial",
          "times its factor, materials.LW.E must be greater than 0"},
@@ -315,11 +321,9 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
     const std::size_t experiments = good_study.find("[[experiments]]");
     const std::size_t parameters = good_study.find("[[parameters]]");
     const std::size_t optimizer = good_study.find("[optimizer]");
-    expect_error((folder / "study.toml").string(), "experiments", "missing",
-                 [&] { folder.read(good_study.substr(parameters)); });
-    expect_error((folder / "study.toml").string(), "parameters", "missing", [&] {
-        folder.read(good_study.substr(experiments, parameters - experiments) + good_study.substr(optimizer));
-    });
+    expect_error((folder / "study.toml").string(), "experiments", "missing", [&] { folder.read(good_study.substr(parameters)); });
+    expect_error((folder / "study.toml").string(), "parameters", "missing",
+                 [&] { folder.read(good_study.substr(experiments, parameters - experiments) + good_study.substr(optimizer)); });
     expect_error((folder / "study.toml").string(), "parameters", "at least one",
                  [&] { folder.read("parameters = []\n" + good_study.substr(experiments, parameters - experiments)); });
 }

@@ -107,10 +107,9 @@ TEST(UnitTables, FurtherCracks) {
 TEST(UnitTables, Reactions) {
     const TemporaryFolder folder;
     write(small_record(), folder / "record.h5");
-    EXPECT_EQ(table(folder / "record.h5", "reactions"),
-              "time_s,top_x_N,top_y_N,\"left, wheel_x_N\",\"left, wheel_y_N\"\n"
-              "0,0,0,0,0\n"
-              "1e-06,1,2,-3,4\n");
+    EXPECT_EQ(table(folder / "record.h5", "reactions"), "time_s,top_x_N,top_y_N,\"left, wheel_x_N\",\"left, wheel_y_N\"\n"
+                                                        "0,0,0,0,0\n"
+                                                        "1e-06,1,2,-3,4\n");
 }
 
 // The load at which the crack moves on from each place, also from those that it jumps over.
@@ -166,7 +165,8 @@ TEST(UnitTables, UnknownTableListsThoseThatThereAre) {
     write(small_record(), folder / "record.h5");
     EXPECT_EQ(refusal(folder / "record.h5", "serie"), "must be one of: series, path, crack1, path1, driving, reactions");
     write(small_fit(), folder / "fit.h5");
-    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation, checks, distances, models, paths, path_distances, profile, posterior");
+    EXPECT_EQ(refusal(folder / "fit.h5", "series"), "must be one of: parameters, runs, residuals, correlation, checks, "
+                                                    "distances, models, paths, path_distances, profile, posterior");
     Specimen specimen;
     specimen.pixel = 1e-5;
     write(specimen, folder / "specimen.h5");

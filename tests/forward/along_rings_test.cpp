@@ -13,8 +13,8 @@ namespace {
 constexpr double period = 2.2e-3, latewood_fraction = 0.25;  // of the rings; they lie level
 constexpr double half_height = 2.5 * period;                 // [m]
 
-// A strip between grips, five rings high, with a crack from the left this far above the lower border of the middle ring [m]; earlywood
-// below, latewood above (1 - 0.25) 2.2 mm. The crack's tip then goes on along a branch, if any.
+// A strip between grips, five rings high, with a crack from the left this far above the lower border of the middle ring [m];
+// earlywood below, latewood above (1 - 0.25) 2.2 mm. The crack's tip then goes on along a branch, if any.
 struct AlongRings {
     explicit AlongRings(double height, double cell = 0.1e-3) : run(scene(height, cell)) { EXPECT_TRUE(run.solved()); }
 
@@ -47,10 +47,13 @@ TEST(VerificationAlongRings, ACrackInEarlywoodIsTurnedOffLatewood) {
     const double middle = 0.5 * (1.0 - latewood_fraction) * period, branch = 0.4e-3, angle = 15.0 * degree;
     for (const double off : {-0.5e-3, -0.3e-3, 0.3e-3, 0.5e-3}) {
         const TipLoad load = AlongRings(middle + off).run.load();
-        const double up = AlongRings(middle + off).released_by(angle, branch), down = AlongRings(middle + off).released_by(-angle, branch);
-        const Vec2 branch_up = branch_intensities(angle, load.K_I, load.K_II), branch_down = branch_intensities(-angle, load.K_I, load.K_II);
-        std::printf("%+.1f mm off the middle of earlywood: K_II / K_I %+.3f; branch up over branch down: %.3f by energy, %.3f by K\n",
-                    1e3 * off, load.K_II / load.K_I, up / down, branch_up.squaredNorm() / branch_down.squaredNorm());
+        const double up = AlongRings(middle + off).released_by(angle, branch),
+                     down = AlongRings(middle + off).released_by(-angle, branch);
+        const Vec2 branch_up = branch_intensities(angle, load.K_I, load.K_II),
+                   branch_down = branch_intensities(-angle, load.K_I, load.K_II);
+        std::printf(
+            "%+.1f mm off the middle of earlywood: K_II / K_I %+.3f; branch up over branch down: %.3f by energy, %.3f by K\n",
+            1e3 * off, load.K_II / load.K_I, up / down, branch_up.squaredNorm() / branch_down.squaredNorm());
         EXPECT_GT(load.K_II * off, 0.0);  // K_II > 0 turns down
         EXPECT_GT((down - up) * off, 0.0);
     }
@@ -60,9 +63,10 @@ TEST(VerificationAlongRings, ACrackInLatewoodIsTurnedOutOfIt) {
     const double middle = (1.0 - 0.5 * latewood_fraction) * period, branch = 0.2e-3, angle = 15.0 * degree;
     for (const double off : {-0.15e-3, 0.15e-3}) {
         const TipLoad load = AlongRings(middle + off, 0.05e-3).run.load();
-        const double up = AlongRings(middle + off, 0.05e-3).released_by(angle, branch), down = AlongRings(middle + off, 0.05e-3).released_by(-angle, branch);
-        std::printf("%+.2f mm off the middle of latewood: K_II / K_I %+.3f; branch up over branch down: %.3f by energy\n", 1e3 * off,
-                    load.K_II / load.K_I, up / down);
+        const double up = AlongRings(middle + off, 0.05e-3).released_by(angle, branch),
+                     down = AlongRings(middle + off, 0.05e-3).released_by(-angle, branch);
+        std::printf("%+.2f mm off the middle of latewood: K_II / K_I %+.3f; branch up over branch down: %.3f by energy\n",
+                    1e3 * off, load.K_II / load.K_I, up / down);
         EXPECT_LT(load.K_II * off, 0.0);
         EXPECT_GT((up - down) * off, 0.0);
     }

@@ -30,9 +30,11 @@ double release_rate(double here, double beyond, double distance, double cell, Pl
 }
 
 TEST(VerificationBoundary, GFallsTowardStifferWoodAsTheSingularitySays) {
-    // G ~ d^m, m from the exponents of Zak and Williams 1963 (REFERENCES: tip near a boundary; nu = 0.33), which hold for d much smaller
-    // than the crack: here a sixtieth to a fortieth of it.
-    struct Exact { double ratio, stress, strain; };
+    // G ~ d^m, m from the exponents of Zak and Williams 1963 (REFERENCES: tip near a boundary; nu = 0.33), which hold for d much
+    // smaller than the crack: here a sixtieth to a fortieth of it.
+    struct Exact {
+        double ratio, stress, strain;
+    };
     for (const auto& [ratio, stress, strain] : {Exact{3, 0.216, 0.188}, {15, 0.412, 0.332}, {30, 0.449, 0.357}}) {
         for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
             const double exact = plane == PlaneCondition::strain ? strain : stress, h = 25e-6;
@@ -46,14 +48,16 @@ TEST(VerificationBoundary, GFallsTowardStifferWoodAsTheSingularitySays) {
 }
 
 TEST(VerificationBoundary, GBesideABoundaryDoesNotDependOnTheGrid) {
-    // In front of softer wood the exponents' slope, -0.70, is reached only at 1e-4 of the crack's length: what is left of the difference
-    // goes with (d / a)^0.43. So the grid is held against one of cells half as wide.
+    // In front of softer wood the exponents' slope, -0.70, is reached only at 1e-4 of the crack's length: what is left of the
+    // difference goes with (d / a)^0.43. So the grid is held against one of cells half as wide.
     for (const bool stiffer : {true, false}) {
         double worst = 0.0;
         std::printf("G toward wood 30 times as %s, against cells half as wide:", stiffer ? "stiff" : "soft");
         for (const double cells : {2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0}) {
             const double h = 0.1e-3, here = stiffer ? 40e6 : 1200e6, beyond = stiffer ? 1200e6 : 40e6;
-            const auto with_cells = [&](double cell) { return release_rate(here, beyond, cells * h, cell, PlaneCondition::strain); };
+            const auto with_cells = [&](double cell) {
+                return release_rate(here, beyond, cells * h, cell, PlaneCondition::strain);
+            };
             const double off = with_cells(h) / with_cells(0.5 * h) - 1;
             std::printf(" %+.2f %%", 100 * off);
             worst = std::max(worst, std::abs(off));

@@ -42,7 +42,7 @@ TEST(UnitBridging, TractionIsTheSlopeOfItsEnergy) {
     }
 }
 
-constexpr double drawing_speed = 0.02;  // [m/s]
+constexpr double drawing_speed = 0.02;   // [m/s]
 constexpr Bridging fibres{2e6, 0.1e-3};  // 100 J/m^2
 
 // Two halves of a block that bridged faces alone join are drawn apart by `widest`, and then come back.
@@ -63,9 +63,9 @@ Scene two_halves(Vec2 from, Vec2 to, double widest) {
 }
 
 TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
-    // Equilibrium of two halves that stretch evenly: the stress is the law's at the opening that their stretch, stress height / E',
-    // leaves; on the way back it goes with the opening. Waves of the start, density times their speed times that of the drawing, are
-    // 0.4 % of the stress.
+    // Equilibrium of two halves that stretch evenly: the stress is the law's at the opening that their stretch, stress height /
+    // E', leaves; on the way back it goes with the opening. Waves of the start, density times their speed times that of the
+    // drawing, are 0.4 % of the stress.
     const double modulus = 400e6 / (1 - 0.33 * 0.33), height = 2e-3, width = 2e-3;
     const double waves = drawing_speed * std::sqrt(300.0 * modulus) / fibres.stress;
     for (const double y : {1e-3, 1.125e-3, 1.05e-3}) {  // on nodes, between them, and near them
@@ -73,15 +73,18 @@ TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
             const Record record = simulate(two_halves({-1e-3, y}, {3e-3, y}, widest));
             double worst = 0.0, furthest = 0.0, work = 0.0, stretch = 0.0;
             for (const Instant& row : record.series) {
-                const double stress = row.force / width, opening = row.displacement - drawing_speed * row.time - stress / modulus * height;
+                const double stress = row.force / width,
+                             opening = row.displacement - drawing_speed * row.time - stress / modulus * height;
                 furthest = std::max(furthest, opening);
                 const bool goes_apart = row.time < widest / drawing_speed;
                 const double most = std::max(0.0, fibres.stress * (1 - furthest / fibres.opening));
-                if (opening > 2e-6) worst = std::max(worst, std::abs(stress - (goes_apart ? most : most * opening / furthest)) / fibres.stress);
+                if (opening > 2e-6)
+                    worst = std::max(worst, std::abs(stress - (goes_apart ? most : most * opening / furthest)) / fibres.stress);
                 if (goes_apart) work = row.external_work, stretch = 0.5 * stress * stress / modulus * height;
             }
             const double off = work / width / (taken(fibres, furthest) + stretch) - 1;
-            std::printf("crack at %.3f mm, drawn apart by %.2f mm: stress off by %.2f %% of the law's, work by %+.3f %%, books by %.3f %%\n",
+            std::printf("crack at %.3f mm, drawn apart by %.2f mm: stress off by %.2f %% of the law's, work by %+.3f %%, books "
+                        "by %.3f %%\n",
                         1e3 * y, 1e3 * widest, 100 * worst, 100 * off, 100 * record.worst_energy_imbalance);
             EXPECT_LT(worst, 2.0 * waves);
             EXPECT_LT(std::abs(off), 0.005);
@@ -95,7 +98,8 @@ TEST(VerificationBridging, TwoHalvesFollowTheLaw) {
 }
 
 TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
-    // Drawn apart along the normal of the crack, both halves as a whole, faces carry the stress times their length, whatever the grid.
+    // Drawn apart along the normal of the crack, both halves as a whole, faces carry the stress times their length, whatever the
+    // grid.
     for (const double angle : {10.0, 30.0, 45.0, 70.0}) {
         const Vec2 along(std::cos(angle * degree), std::sin(angle * degree)), middle(1.03e-3, 0.96e-3);
         Scene scene = two_halves(middle - 4e-3 * along, middle + 4e-3 * along, 0.05e-3);
@@ -108,13 +112,15 @@ TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
         Vec2 left = Vec2::Zero();
         for (const FieldPair& pair : run.solver.cracks().pairs) left += force[pair.left];
         const double length = run.solver.cracks().lines[0].length, wanted = fibres.stress * 0.8 * length;
-        std::printf("crack at %.0f degrees: traction over its length off by %+.3f %%\n", angle, 100 * (-left.dot(left_of(along)) / wanted - 1));
+        std::printf("crack at %.0f degrees: traction over its length off by %+.3f %%\n", angle,
+                    100 * (-left.dot(left_of(along)) / wanted - 1));
         EXPECT_NEAR(-left.dot(left_of(along)), wanted, 0.01 * wanted);  // places at a side count whole or not, 1/16 of a cell
     }
 }
 
-// A strip between grips that are drawn apart slowly, its notch on the left. Far behind the tip nothing is left, far ahead the strain is
-// even: G = C u^2 / h, C the modulus of wood that cannot contract aside, whatever the length of the crack (REFERENCES: strip).
+// A strip between grips that are drawn apart slowly, its notch on the left. Far behind the tip nothing is left, far ahead the
+// strain is even: G = C u^2 / h, C the modulus of wood that cannot contract aside, whatever the length of the crack (REFERENCES:
+// strip).
 Scene strip(double cell, double lift, double speed, std::optional<Bridging> law) {
     Scene scene = at_motion(block({16e-3, 4e-3}, cell));
     scene.edges = {moving("top", Side::top, {0.0, speed}), moving("bottom", Side::bottom, {0.0, -speed})};
@@ -131,8 +137,8 @@ Scene strip(double cell, double lift, double speed, std::optional<Bridging> law)
 }
 
 TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
-    // Rice (1968): of G far away a zone of bridges that are all broken at its far end takes the energy of the law. The zone is about 8
-    // cells long; wherever in a cell the tip lies, and the crack.
+    // Rice (1968): of G far away a zone of bridges that are all broken at its far end takes the energy of the law. The zone is
+    // about 8 cells long; wherever in a cell the tip lies, and the crack.
     const double u = 82e-6, speed = 0.1, half_height = 4e-3, cell = 0.2e-3;
     const double far = 40e6 * (1 - 0.33) / (1.33 * 0.34) * u * u / half_height;
     const Bridging law{0.5e6, 0.15e-3, true};
@@ -146,8 +152,9 @@ TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
         scene.stop = {};
         scene.stop.time = 1.3e-3;
         const Instant end = simulate(scene).series.back();
-        std::printf("tip at %.2f mm, crack %.1f of a cell up: G off by %+.2f %%, K_I^2 / E' by %+.2f %% of that far away\n", 1e3 * tip, lift,
-                    100 * (end.G - far + law.energy()) / far, 100 * (end.K_I * end.K_I / plane_modulus() - far + law.energy()) / far);
+        std::printf("tip at %.2f mm, crack %.1f of a cell up: G off by %+.2f %%, K_I^2 / E' by %+.2f %% of that far away\n",
+                    1e3 * tip, lift, 100 * (end.G - far + law.energy()) / far,
+                    100 * (end.K_I * end.K_I / plane_modulus() - far + law.energy()) / far);
         EXPECT_NEAR(end.G, far - law.energy(), 0.03 * far);
         EXPECT_NEAR(end.K_I * end.K_I / plane_modulus(), far - law.energy(), 0.03 * far);
     }
@@ -173,18 +180,18 @@ Growing growing(const Scene& scene) {
     return {constrained * end.displacement * end.displacement / 2e-3, sum / rows};
 }
 
-// Suo, Bao and Fan (1992): a crack whose zone has its full length grows at the toughness of the tip and the energy of the law. `most`:
-// how far it may be off as a part of that. The grid's own part in it shows without bridges.
+// Suo, Bao and Fan (1992): a crack whose zone has its full length grows at the toughness of the tip and the energy of the law.
+// `most`: how far it may be off as a part of that. The grid's own part in it shows without bridges.
 void check_growing(double cell, double lift, std::initializer_list<double> stresses, double most) {
     const Growing plain = growing(strip(cell, lift * cell, 0.02, std::nullopt));
-    std::printf("cell %.2f mm, crack %.1f of one up: without bridges grows at %.1f of 100 J/m^2, J at the tip %.1f\n", 1e3 * cell, lift,
-                plain.far, plain.tip);
+    std::printf("cell %.2f mm, crack %.1f of one up: without bridges grows at %.1f of 100 J/m^2, J at the tip %.1f\n", 1e3 * cell,
+                lift, plain.far, plain.tip);
     for (const double stress : stresses) {
         const Bridging law{stress, 0.1e-3};
         const Growing bridged = growing(strip(cell, lift * cell, 0.02, law));
         const double both = 100.0 + law.energy();
-        std::printf("    with %.1f MPa to %.2f mm at %.1f of %.0f: %+.1f %%; J at the tip %.1f; bridges took %+.1f %% of %.0f\n", 1e-6 * stress,
-                    1e3 * law.opening, bridged.far, both, 100 * (bridged.far / both - 1), bridged.tip,
+        std::printf("    with %.1f MPa to %.2f mm at %.1f of %.0f: %+.1f %%; J at the tip %.1f; bridges took %+.1f %% of %.0f\n",
+                    1e-6 * stress, 1e3 * law.opening, bridged.far, both, 100 * (bridged.far / both - 1), bridged.tip,
                     100 * ((bridged.far - plain.far) / law.energy() - 1), law.energy());
         EXPECT_NEAR(bridged.far, both, most * both);
     }

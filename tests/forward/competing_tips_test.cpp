@@ -19,7 +19,8 @@ constexpr double mm_per_minute = 1e-3 / 60.0;
 Scene drawn_plate(double cell) {
     Scene scene = at_equilibrium(block({40e-3, 120e-3}, cell));
     scene.materials["EW"].toughness = 1.0;
-    scene.edges = {without(moving("top", Side::top, {0.0, mm_per_minute}), 0), without(moving("bottom", Side::bottom, {0.0, 0.0}), 0),
+    scene.edges = {without(moving("top", Side::top, {0.0, mm_per_minute}), 0),
+                   without(moving("bottom", Side::bottom, {0.0, 0.0}), 0),
                    held_at("hinge", Side::bottom, 20e-3, cell, 0.0, std::nullopt)};
     scene.measure = {"top", "top"};
     scene.stop.displacement = 5e-3;
@@ -74,9 +75,11 @@ TEST(VerificationTips, BothEndsOfACentreCrackGrowByTheExactEnergy) {
         }
         for (const auto& tip : record.paths[0]) uneven = std::max(uneven, std::abs(tip.y() - 60e-3));
         const double off = record.paths[0].front().x() + record.paths[0].back().x() - 40e-3;
-        std::printf("centre crack, both ends, advance %.0f mm: critical force within %.2f %% of the exact energy's over a/b 0.3 to 0.6; "
-                    "ends at %.4f and %.4f mm, %ld equilibria, %.2f s\n", 1e3 * advance, 100 * worst, 1e3 * record.paths[0].front().x(),
-                    1e3 * record.paths[0].back().x(), record.steps, record.seconds);
+        std::printf(
+            "centre crack, both ends, advance %.0f mm: critical force within %.2f %% of the exact energy's over a/b 0.3 to 0.6; "
+            "ends at %.4f and %.4f mm, %ld equilibria, %.2f s\n",
+            1e3 * advance, 100 * worst, 1e3 * record.paths[0].front().x(), 1e3 * record.paths[0].back().x(), record.steps,
+            record.seconds);
         EXPECT_LT(worst, 0.01);  // six cells per half crack at first; the formula is good to 0.1 %
         EXPECT_LT(std::abs(off), 1e-9);
         EXPECT_EQ(uneven, 0.0);
@@ -105,8 +108,8 @@ void expect_the_same(const Record& record, const Record& alone, const char* what
         worst = std::max({worst, std::abs(a.crack_length - b.crack_length) / 20e-3, std::abs(a.force - b.force) / force,
                           std::abs(a.displacement - b.displacement) / 5e-3});
     }
-    std::printf("%s: off the run in which only one may grow by %.1e, %ld equilibria against %ld, %.2f s against %.2f s\n", what, worst,
-                record.steps, alone.steps, record.seconds, alone.seconds);
+    std::printf("%s: off the run in which only one may grow by %.1e, %ld equilibria against %ld, %.2f s against %.2f s\n", what,
+                worst, record.steps, alone.steps, record.seconds, alone.seconds);
     EXPECT_LT(worst, 1e-9);
     for (const double length : record.cracks[0].length) EXPECT_EQ(length, record.cracks[0].length[0]);
 }
@@ -138,7 +141,8 @@ TEST(VerificationTips, TwoEqualEdgeCracksGrowTogether) {
     double uneven = 0.0;
     for (std::size_t i = 0; i < record.series.size(); ++i)
         uneven = std::max(uneven, std::abs(record.series[i].crack_length - record.cracks[0].length[i]));
-    std::printf("two edge cracks of 8 mm: as long as each other to %.1e mm, %ld equilibria, %.2f s\n", 1e3 * uneven, record.steps, record.seconds);
+    std::printf("two edge cracks of 8 mm: as long as each other to %.1e mm, %ld equilibria, %.2f s\n", 1e3 * uneven, record.steps,
+                record.seconds);
     EXPECT_LT(uneven, 1e-9);
     EXPECT_NEAR(record.series.back().crack_length, 15e-3, 1e-8);
     EXPECT_NEAR(record.series.back().fracture_energy, 14e-3, 1e-8);

@@ -49,8 +49,8 @@ Edge guided(std::string name, Side side, int axis) {
 Scene notched(double angle, double deep, double radius, double cell) {
     Scene scene = block({10e-3, 10e-3}, cell);
     const double half = 0.5 * angle;
-    scene.specimen.cutouts = {Polygon{{Vec2(5e-3 - deep * std::tan(half), 10e-3), Vec2(5e-3 + deep * std::tan(half), 10e-3),
-                                       Vec2(5e-3, 10e-3 - deep)}}};
+    scene.specimen.cutouts = {Polygon{
+        {Vec2(5e-3 - deep * std::tan(half), 10e-3), Vec2(5e-3 + deep * std::tan(half), 10e-3), Vec2(5e-3, 10e-3 - deep)}}};
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     for (const double side : {-1.0, 1.0}) {
         const Vec2 touched(5e-3 + side * (deep - 1e-3) * std::tan(half), 9e-3);
@@ -216,8 +216,8 @@ TEST(VerificationPlates, ABlockSpreadsEvenly) {
             least = std::min(least, out);
             most = std::max(most, out);
         }
-        std::printf("block between plates, %.1f mm cells: side goes out by %.6f to %.6f mm per %%, exact 0.0214286\n",
-                    1e3 * cell, 1e3 * least, 1e3 * most);
+        std::printf("block between plates, %.1f mm cells: side goes out by %.6f to %.6f mm per %%, exact 0.0214286\n", 1e3 * cell,
+                    1e3 * least, 1e3 * most);
         EXPECT_NEAR(least, 0.0214286e-3, 0.03 * 0.0214286e-3);
         EXPECT_NEAR(most, 0.0214286e-3, 0.03 * 0.0214286e-3);
         EXPECT_LT(most - least, 1e-6 * most);
@@ -251,8 +251,8 @@ TEST(VerificationWedgeStatics, HalvesOfAWedgePushNormalToTheFlanks) {
 }
 
 TEST(VerificationWedgeStatics, WheelsPushNormalToTheFlanks) {
-    // Asked: 1 %. The load is small, so that the flanks have hardly turned, and a wheel touches a fifth of a cell. The dent that a
-    // cell can show leans one way or the other with the place in the cell, by a thousandth: a steep flank turns that into up to
+    // Asked: 1 %. The load is small, so that the flanks have hardly turned, and a wheel touches a fifth of a cell. The dent that
+    // a cell can show leans one way or the other with the place in the cell, by a thousandth: a steep flank turns that into up to
     // 2.5 % of the ratio, which wavers about the exact one as the wheel rolls.
     const double cell = 0.1e-3;
     for (const double degrees : {10.0, 15.0, 20.0, 30.0}) {
@@ -283,8 +283,8 @@ double wedge_force(double cell) {
 }
 
 TEST(SlowVerificationWedgeForce, HardlyDependsOnTheGrid) {
-    // The wheels touch 0.2 mm of each flank, one to four cells, and what the wood gives way there is a tenth of the travel: that is
-    // what is left of the grid.
+    // The wheels touch 0.2 mm of each flank, one to four cells, and what the wood gives way there is a tenth of the travel: that
+    // is what is left of the grid.
     const double finest = wedge_force(0.05e-3);
     for (const double cell : {0.2e-3, 0.133e-3, 0.1e-3}) {
         const double force = wedge_force(cell);

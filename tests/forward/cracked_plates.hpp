@@ -29,4 +29,4 @@ struct AtRest {
     }
 };
 
-} // namespace crampfit::test
+}  // namespace crampfit::test

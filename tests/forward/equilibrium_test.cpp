@@ -37,8 +37,8 @@ Eigen::Matrix3d oblique_stiffness() {
 }
 
 Eigen::Matrix4d tangent_at(const Mat2& G, const Eigen::Matrix3d& C, bool rotates, bool geometric = true) {
-    const auto A = elastic_tangent<double>({G(0, 0), G(0, 1), G(1, 0), G(1, 1)}, {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)},
-                                           rotates, geometric);
+    const auto A = elastic_tangent<double>({G(0, 0), G(0, 1), G(1, 0), G(1, 1)},
+                                           {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)}, rotates, geometric);
     Eigen::Matrix4d tangent;
     for (int i = 0; i < 4; ++i)
         for (int j = 0; j < 4; ++j) tangent(i, j) = A[i][j];
@@ -106,8 +106,7 @@ TEST(UnitElasticity, WithoutItsGeometricPartTheTangentIsNeverNegative) {
     EXPECT_TRUE(whole_was_negative) << "this test says nothing";
     // Without stress there is no such part.
     EXPECT_LT(
-        (tangent_at(turn(1.0) - Mat2::Identity(), C, true, false) - tangent_at(turn(1.0) - Mat2::Identity(), C, true))
-            .norm(),
+        (tangent_at(turn(1.0) - Mat2::Identity(), C, true, false) - tangent_at(turn(1.0) - Mat2::Identity(), C, true)).norm(),
         1e-13 * C.norm());
 }
 
@@ -180,7 +179,8 @@ TEST(UnitInternalForce, UnevenCellsHaveTheTangentOfTheirForce) {
                 std::vector<Vec2> more = displacement, less = displacement;
                 more[node[i / 2]][i % 2] += 1e-9;
                 less[node[i / 2]][i % 2] -= 1e-9;
-                slope.col(i) = (uneven.state(piece, *piece.wood, more).force - uneven.state(piece, *piece.wood, less).force) / 2e-9;
+                slope.col(i) =
+                    (uneven.state(piece, *piece.wood, more).force - uneven.state(piece, *piece.wood, less).force) / 2e-9;
             }
             worst = std::max(worst, (uneven.tangent(piece, displacement, true) - slope).norm() / std::max(slope.norm(), 1e3));
         }
@@ -238,7 +238,9 @@ struct RandomGrid {
         element[c].stiffness = spread * spread.transpose() + 0.1 * Eigen::Matrix<double, 8, 8>::Identity();
         for (int a = 0; a < 8; ++a) element[c].equation[a] = a % 2 < count[nodes[a / 2]] ? first[nodes[a / 2]] + a % 2 : -1;
     }
-    bool make() { return factor.factor([&](int c, auto& elements) { elements.push_back(element[c]); }); }
+    bool make() {
+        return factor.factor([&](int c, auto& elements) { elements.push_back(element[c]); });
+    }
     Eigen::MatrixXd dense() const {
         Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(equations(), equations());
         for (const auto& e : element)

@@ -12,7 +12,8 @@
 namespace crampfit::test {
 namespace {
 
-// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the left.
+// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the
+// left.
 Scene two_woods(double boundary, double tip, double cell) {
     Scene scene = at_rest({4e-3, 4e-3}, cell);
     scene.specimen.material.clear();
@@ -29,7 +30,8 @@ Scene two_woods(double boundary, double tip, double cell) {
 }
 
 // In boxes about the way from the tip as it is to the tip a little further, or about another way.
-MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numbers = {}, std::optional<Vec2> from = {}, double way = 0.0) {
+MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numbers = {}, std::optional<Vec2> from = {},
+                       double way = 0.0) {
     FineTip fine_tip(run.scene, run.plan, run.materials, run.body, numbers);
     if (!from) from = run.equilibrium.cracks().lines[0].end.position;
     const auto boxes = fine_tip.about(run.equilibrium.cracks(), 0, *from, *from + Vec2(way, 0.0));
@@ -37,9 +39,12 @@ MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numb
 }
 
 TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
-    // The reference is tests/forward/boundary_reference.py: finite elements of its own, good to 2e-4. The load that carries the crack
-    // across goes with the root of the least of these rates, so that 3 % are half of that in the load.
-    struct Reference { double boundary; std::array<double, 5> rate; };
+    // The reference is tests/forward/boundary_reference.py: finite elements of its own, good to 2e-4. The load that carries the
+    // crack across goes with the root of the least of these rates, so that 3 % are half of that in the load.
+    struct Reference {
+        double boundary;
+        std::array<double, 5> rate;
+    };
     constexpr std::array<double, 5> starts{-0.4e-3, -0.2e-3, -0.1e-3, 0.0, 0.2e-3};  // of the way over 0.2 mm, from the boundary
     for (const auto& [boundary, exact] : {Reference{2.0e-3, {2.3332, 1.6504, 5.2023, 16.3620, 41.8034}},
                                           Reference{2.025e-3, {2.3416, 1.6550, 5.2150, 16.4026, 41.9218}},
@@ -53,7 +58,8 @@ TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
             const double released = before - run.equilibrium.potential();
             const double grid = released / 0.2e-3 / exact[k] - 1;
             const double error = (released + missed_before - missed_by(run, {}, start, 0.2e-3).energy) / 0.2e-3 / exact[k] - 1;
-            std::printf("boundary %.2f cells off a grid line, tip from %+.1f mm on: G over 0.2 mm off by %+.1f %%, without fine boxes %+.1f %%\n",
+            std::printf("boundary %.2f cells off a grid line, tip from %+.1f mm on: G over 0.2 mm off by %+.1f %%, without fine "
+                        "boxes %+.1f %%\n",
                         (boundary - 2e-3) / 0.1e-3, 1e3 * starts[k], 100 * error, 100 * grid);
             EXPECT_LT(std::abs(error), 0.03) << boundary << " " << starts[k];
         }
@@ -74,11 +80,11 @@ TEST(VerificationFineTip, CrackJustOffAGridLineIsTheSame) {
 
 TEST(UnitFineTip, NothingIsMissedInOneWood) {
     Scene scene = two_woods(2e-3, 1.5e-3, 0.1e-3);
-    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);                          // the boundary is five cells away
+    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);  // the boundary is five cells away
     scene.cracks[0].points[1].x() = 1.9e-3;
     EXPECT_NE(missed_by(AtRest(scene)).energy, 0.0);
     scene.materials["LW"].youngs_modulus = 60e6;
-    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);                          // no sharp boundary
+    EXPECT_EQ(missed_by(AtRest(scene)).energy, 0.0);  // no sharp boundary
 }
 
 TEST(UnitFineTip, BoxesThatTakeACrackAlongAreAsMadeAnew) {
@@ -107,7 +113,8 @@ TEST(UnitCutOut, InTheGridsOwnCellsItsEquilibriumIsTheBoxs) {
     const AtRest run(two_woods(2.025e-3, 1.93e-3, 0.1e-3));
     const CrackFields& cracks = run.equilibrium.cracks();
     const GridView grid{run.body, cracks, run.equilibrium.displacements(), Vec2::Zero(), 0};
-    const auto wood = std::make_shared<CutOutWood>(run.scene, run.materials, Box{Vec2(1.2e-3, 1.4e-3), Vec2(2.6e-3, 2.6e-3)}, 0.1e-3);
+    const auto wood =
+        std::make_shared<CutOutWood>(run.scene, run.materials, Box{Vec2(1.2e-3, 1.4e-3), Vec2(2.6e-3, 2.6e-3)}, 0.1e-3);
     const std::vector<MaterialSlope> numbers;
     CutOut part(run.scene, run.plan, numbers, wood);
     ASSERT_TRUE(part.solve(cracks.lines[0], 0, true, grid, false));
@@ -158,16 +165,17 @@ std::pair<double, double> crossing(double cell, bool extrapolate) {
     double most = 0.0;
     for (std::size_t k = 0; k + 1 < record.series.size(); ++k) {
         most = std::max(most, record.series[k].force);
-        if (record.series[k + 1].crack_length - record.series[k].crack_length > 0.4e-3) return {record.series[k].displacement, most};
+        if (record.series[k + 1].crack_length - record.series[k].crack_length > 0.4e-3)
+            return {record.series[k].displacement, most};
     }
     ADD_FAILURE() << "no jump across latewood";
     return {0.0, 0.0};
 }
 
-// The load that a crack needs is highest a part of an advance before latewood. Where stations lie must not matter to it: they begin with the
-// crack as it is given.
+// The load that a crack needs is highest a part of an advance before latewood. Where stations lie must not matter to it: they
+// begin with the crack as it is given.
 TEST(VerificationStations, PeakOfTheLoadIsFoundBetweenThem) {
-    for (const double pith : {-20e-3, 30e-3}) {          // into latewood over its sharp side, either way
+    for (const double pith : {-20e-3, 30e-3}) {  // into latewood over its sharp side, either way
         double least = INFINITY, most = 0.0;
         for (const double start : {2.50e-3, 2.52e-3, 2.54e-3, 2.56e-3}) {  // which moves the stations along
             Scene scene = at_equilibrium(ring_specimen(start, 0.1e-3));
@@ -193,8 +201,8 @@ TEST(SlowVerificationFineTip, LoadThatCarriesACrackIntoLatewoodConverges) {
         std::vector<std::pair<double, double>> found;
         for (const double cell : {0.2e-3, 0.1e-3, 0.05e-3}) {
             found.push_back(crossing(cell, extrapolate));
-            std::printf("sharp rings, %s, %.2f mm cells: crosses at %.5f mm, peak %.2f N\n", extrapolate ? "two grids" : "one grid", 1e3 * cell,
-                        1e3 * found.back().first, found.back().second);
+            std::printf("sharp rings, %s, %.2f mm cells: crosses at %.5f mm, peak %.2f N\n",
+                        extrapolate ? "two grids" : "one grid", 1e3 * cell, 1e3 * found.back().first, found.back().second);
         }
         EXPECT_NEAR(found[1].first, found[2].first, 0.02 * found[2].first);
         EXPECT_NEAR(found[1].second, found[2].second, 0.02 * found[2].second);

@@ -70,8 +70,8 @@ void check_slowly_loaded(double cells, double bar) {
     const Problem plate = problems().front();
     const Record record = simulate(in_damped_motion(plate.scene(cells, 4), plate.slowest));
     const double error = plate.ratio(record) - 1.0;
-    std::printf("centre crack loaded slowly, %2.0f cells per half crack: J off by %+.2f %%, %ld points, %.2f s\n", cells, 100 * error,
-                record.points, record.seconds);
+    std::printf("centre crack loaded slowly, %2.0f cells per half crack: J off by %+.2f %%, %ld points, %.2f s\n", cells,
+                100 * error, record.points, record.seconds);
     EXPECT_LT(std::abs(error), bar) << cells << " cells";
 }
 

@@ -25,7 +25,9 @@ Body rough(std::string name, Shape shape, Vec2 velocity, double friction) {
     return body;
 }
 
-Vec2 push_of(const StaticTrial& run, int body) { return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body]; }
+Vec2 push_of(const StaticTrial& run, int body) {
+    return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
+}
 
 // A block hangs from its top; a plate presses on its lower side with a force and goes aside by 1 mm a second, or follows a force.
 Scene on_a_plate(double friction, double push) {
@@ -97,17 +99,18 @@ TEST(VerificationFreeBody, AForceGivesTheWayThatGaveTheForce) {
         ASSERT_TRUE(by_force.solve(0.0));
         const double way = by_force.equilibrium.contacts().moved[1].y();
         std::printf("friction %.1f: force %.4f N, way %.8f mm of -0.05 mm, %d and %d factorisations\n", friction,
-                    push_of(by_way, 0).y(), 1e3 * way, by_way.equilibrium.factorisations(), by_force.equilibrium.factorisations());
+                    push_of(by_way, 0).y(), 1e3 * way, by_way.equilibrium.factorisations(),
+                    by_force.equilibrium.factorisations());
         EXPECT_NEAR(push_of(by_force, 0).y(), push_of(by_way, 0).y(), 1e-6 * std::abs(push_of(by_way, 0).y()));
         EXPECT_NEAR(way, -0.05e-3, (friction > 0 ? 1e-3 : 1e-6) * 0.05e-3);
     }
 }
 
 TEST(SlowVerificationFriction, PartialSlipOfAWheel) {
-    // Cattaneo (1938) and Mindlin (1949) for cylinders (Johnson 1985, eqs. 7.24 to 7.28): a wheel that is pressed by P and then pushed aside
-    // by Q slips from both edges in to c = a (1 - Q / (mu P))^1/2, and the traction that is left of Coulomb's is half an ellipse on c
-    // more: the integral of q x^2 is mu P / 4 (a^2 - c^4 / a^2). This holds where pressing shifts nothing aside, at nu = 1/2; at 0.45 it is
-    // a quarter of what it is at 0.33.
+    // Cattaneo (1938) and Mindlin (1949) for cylinders (Johnson 1985, eqs. 7.24 to 7.28): a wheel that is pressed by P and then
+    // pushed aside by Q slips from both edges in to c = a (1 - Q / (mu P))^1/2, and the traction that is left of Coulomb's is
+    // half an ellipse on c more: the integral of q x^2 is mu P / 4 (a^2 - c^4 / a^2). This holds where pressing shifts nothing
+    // aside, at nu = 1/2; at 0.45 it is a quarter of what it is at 0.33.
     const double nu = 0.45, size = 2.4e-3, cell = 0.03e-3, friction = 0.3, P = 1e3;
     Scene scene = hertz(friction, nu, cell, size);
     scene.bodies[0].velocity = {1e-3, 0.0};
@@ -152,7 +155,8 @@ double wedge_ratio(double angle, double friction) {
 Scene wedge(double angle, double friction, bool wheels) {
     const double deep = 6e-3, slope = std::tan(angle / 2);
     Scene scene = at_rest({10e-3, 10e-3}, 0.2e-3);
-    scene.specimen.cutouts = {Polygon{{Vec2(5e-3 - deep * slope, 10e-3), Vec2(5e-3 + deep * slope, 10e-3), Vec2(5e-3, 10e-3 - deep)}}};
+    scene.specimen.cutouts = {
+        Polygon{{Vec2(5e-3 - deep * slope, 10e-3), Vec2(5e-3 + deep * slope, 10e-3), Vec2(5e-3, 10e-3 - deep)}}};
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     for (const double side : {-1.0, 1.0}) {
         const auto at = [&](double up, double share) { return Vec2(5e-3 + side * share * slope * up, 10e-3 - deep + up); };
@@ -177,8 +181,9 @@ TEST(VerificationWedgeFriction, ForcesLeanByTheFrictionAngle) {
                 const double across = 0.5 * (push_of(run, 1).x() - push_of(run, 0).x());
                 const double down = -(push_of(run, 0).y() + push_of(run, 1).y());
                 const double error = across / down / wedge_ratio(angle, friction) - 1;
-                std::printf("%s, %4.1f degrees, friction %.1f: F_H / F_V %+.2f %%, %d factorisations\n", wheels ? "wheels" : "wedge in halves",
-                            degrees, friction, 100 * error, run.equilibrium.factorisations());
+                std::printf("%s, %4.1f degrees, friction %.1f: F_H / F_V %+.2f %%, %d factorisations\n",
+                            wheels ? "wheels" : "wedge in halves", degrees, friction, 100 * error,
+                            run.equilibrium.factorisations());
                 EXPECT_LT(std::abs(error), wheels ? 0.03 : 0.01);
             }
         }
@@ -186,8 +191,8 @@ TEST(VerificationWedgeFriction, ForcesLeanByTheFrictionAngle) {
 }
 
 TEST(VerificationCrackFriction, ClosedSlantedCrack) {
-    // Under pressure p and shear t a closed crack slides as if the shear were t - friction p (McClintock and Walsh 1962): K_II is that
-    // of this part alone, the rest of the stress is even.
+    // Under pressure p and shear t a closed crack slides as if the shear were t - friction p (McClintock and Walsh 1962): K_II is
+    // that of this part alone, the rest of the stress is even.
     const double a = 10e-3, pressure = 1e6, K0 = pressure * std::sqrt(std::numbers::pi * a);
     double worst = 0, worst_G = 0;
     for (const double friction : {0.0, 0.3}) {
@@ -216,9 +221,10 @@ TEST(VerificationCrackFriction, ClosedSlantedCrack) {
                         const TipLoad tip = run.equilibrium.load_at(0, at_end);
                         const double wanted = slides * std::sqrt(std::numbers::pi * a);
                         const double G = tip.G * plane_modulus() / (K0 * K0), exact_G = wanted * wanted / (K0 * K0);
-                        std::printf("friction %.1f, shear %+.1f p, %2.0f degrees, %.2f cells off: ", friction, shear / pressure, angle, offset);
-                        std::printf("K_II %+.3f of K0, exact %+.3f; K_I %.3f; G %.3f, exact %.3f\n",
-                                    tip.K_II / K0, wanted / K0, tip.K_I / K0, G, exact_G);
+                        std::printf("friction %.1f, shear %+.1f p, %2.0f degrees, %.2f cells off: ", friction, shear / pressure,
+                                    angle, offset);
+                        std::printf("K_II %+.3f of K0, exact %+.3f; K_I %.3f; G %.3f, exact %.3f\n", tip.K_II / K0, wanted / K0,
+                                    tip.K_I / K0, G, exact_G);
                         worst = std::max(worst, std::abs(tip.K_II - wanted) / K0);
                         worst_G = std::max(worst_G, std::abs(G - exact_G));
                         EXPECT_NEAR(tip.K_II, wanted, 0.03 * K0);
@@ -229,8 +235,9 @@ TEST(VerificationCrackFriction, ClosedSlantedCrack) {
             }
         }
     }
-    std::printf("closed slanted cracks, 10 cells per half crack: K_II within %.3f of p (pi a)^1/2, G within %.3f of its square over E'\n",
-                worst, worst_G);
+    std::printf(
+        "closed slanted cracks, 10 cells per half crack: K_II within %.3f of p (pi a)^1/2, G within %.3f of its square over E'\n",
+        worst, worst_G);
 }
 
 // A block that a crack crosses as a whole, its top held by an edge that goes aside and down.
@@ -271,7 +278,8 @@ TEST(VerificationCrackFriction, FacesThatHoldAreAsOneBlock) {
         ASSERT_TRUE(cut.solve(1.0));
         ASSERT_TRUE(whole.solve(1.0));
         const Vec2 ratio = cut.equilibrium.reactions()[0].cwiseQuotient(whole.equilibrium.reactions()[0]);
-        std::printf("cut at %.2f mm, below the friction: force over a whole block's %.5f, %.5f\n", 1e3 * height, ratio.x(), ratio.y());
+        std::printf("cut at %.2f mm, below the friction: force over a whole block's %.5f, %.5f\n", 1e3 * height, ratio.x(),
+                    ratio.y());
         EXPECT_NEAR(ratio.x(), 1.0, 5e-3);  // faces yield by a hundredth of a cell
         EXPECT_NEAR(ratio.y(), 1.0, 5e-3);
     }
@@ -281,7 +289,8 @@ TEST(VerificationCrackFriction, FacesThatHoldAreAsOneBlock) {
 Vec2 momentum_above(const Trial& run, double height) {
     Vec2 sum = Vec2::Zero();
     for (int p = 0; p < run.body.points.count(); ++p)
-        if (run.body.points.position[p].y() > height) sum += run.body.points.mass[p] * value_at(run.body, p, run.solver.velocities());
+        if (run.body.points.position[p].y() > height)
+            sum += run.body.points.mass[p] * value_at(run.body, p, run.solver.velocities());
     return sum;
 }
 
@@ -306,8 +315,8 @@ void put_down(Scene& scene, bool crack, double friction) {
 }
 
 TEST(VerificationFrictionInMotion, ABlockSlidesAsCoulombSays) {
-    // Pushed by s and pressed by p it gains the momentum m_x = s L t - friction (p L t + m_y): what presses on the plate is p L less what
-    // lifts the block.
+    // Pushed by s and pressed by p it gains the momentum m_x = s L t - friction (p L t + m_y): what presses on the plate is p L
+    // less what lifts the block.
     const double pressure = 1e4, shear = 0.3e4, friction = 0.1, time = 1e-3, length = 20e-3;
     for (const bool crack : {false, true}) {
         Scene scene = pushed_block(shear, pressure);
@@ -318,8 +327,9 @@ TEST(VerificationFrictionInMotion, ABlockSlidesAsCoulombSays) {
         const double exact = shear * length * time - friction * (pressure * length * time + gained.y());
         const EnergyBooks books = run.solver.energies();
         const double kept = books.strain + books.kinetic + books.contact + books.damped;
-        std::printf("%s: momentum %+.2f %% off, energy %+.2f %% of the work off, %.1f %% of it dissipated\n", crack ? "crack faces" : "plate",
-                    100 * (gained.x() / exact - 1), 100 * (kept / books.work - 1), 100 * books.damped / books.work);
+        std::printf("%s: momentum %+.2f %% off, energy %+.2f %% of the work off, %.1f %% of it dissipated\n",
+                    crack ? "crack faces" : "plate", 100 * (gained.x() / exact - 1), 100 * (kept / books.work - 1),
+                    100 * books.damped / books.work);
         EXPECT_NEAR(gained.x(), exact, 0.01 * exact);
         EXPECT_NEAR(kept, books.work, 0.01 * books.work);
     }
@@ -367,7 +377,8 @@ TEST(VerificationFrictionInMotion, WheelsOnFlanksLeanByTheFrictionAngle) {
 }
 
 TEST(VerificationFriction, WorkIsStoredOrDissipated) {
-    // Wheels on the flanks of a notch roll 0.2 mm down: their work, by the trapezoid rule over the increments, against the potential.
+    // Wheels on the flanks of a notch roll 0.2 mm down: their work, by the trapezoid rule over the increments, against the
+    // potential.
     StaticTrial run(wedge(slope_two, 0.3, true), false);
     double work = 0, power = 0, worst = 0;
     const int steps = 32;
@@ -403,9 +414,10 @@ TEST(SlowSystemFriction, AWedgeSplitsABlock) {
         const Record record = simulate(splitting(0.3 * rubs));
         EXPECT_NE(record.status, RunStatus::unstable) << record.message;
         const Instant& last = record.series.back();
-        std::printf("friction %.1f: crack %.3f mm, work %.4f J, fracture %.4f J, strain %.4f J, energy off by %.2f %%, %ld equilibria\n",
-                    0.3 * rubs, 1e3 * last.crack_length, last.external_work, last.fracture_energy, last.strain_energy,
-                    100 * record.worst_energy_imbalance, record.steps);
+        std::printf(
+            "friction %.1f: crack %.3f mm, work %.4f J, fracture %.4f J, strain %.4f J, energy off by %.2f %%, %ld equilibria\n",
+            0.3 * rubs, 1e3 * last.crack_length, last.external_work, last.fracture_energy, last.strain_energy,
+            100 * record.worst_energy_imbalance, record.steps);
         work[rubs] = last.external_work;
     }
     EXPECT_GT(work[1], 1.2 * work[0]);  // friction takes its part
@@ -428,7 +440,8 @@ TEST(UnitFreeBody, IsRefusedWhereItCannotMove) {
 }
 
 TEST(VerificationFreeBody, AGripThatFollowsItsForceIsTheSameAsOneThatIsMoved) {
-    // Linear: a grip is moved aside and up, then only up with the force aside that this took; also with an edge that presses from the side.
+    // Linear: a grip is moved aside and up, then only up with the force aside that this took; also with an edge that presses from
+    // the side.
     Scene scene = at_rest({5e-3, 10e-3}, 0.5e-3);
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     Body grip = rough("grip", rectangle({-1e-3, 9e-3}, {6e-3, 11e-3}), {2e-5, 1e-4}, 0.0);

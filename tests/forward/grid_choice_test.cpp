@@ -15,14 +15,17 @@ namespace crampfit::test {
 namespace {
 
 // The chosen grid's true error, with the estimate beside it: within what was asked for, and below the estimate.
-void check_choice(const char* name, const Scene& scene, double asked, double known_to, double (*off)(const Record&, double), double exact) {
+void check_choice(const char* name, const Scene& scene, double asked, double known_to, double (*off)(const Record&, double),
+                  double exact) {
     const GridChoice choice = choose_grid(scene, asked);
     Scene chosen = scene;
     chosen.model.cell = choice.cell;
     chosen.solver.extrapolate = false;
     const double error = std::abs(off(simulate(chosen), exact));
-    std::printf("%s, %.1f %% asked: cells of %.3f mm, %.2f %% estimated of %s, true error %.3f %% (ratio %.1f), %.2f s to choose, %.2f s to run\n", name, 100 * asked,
-                1e3 * choice.cell, 100 * choice.error, choice.quantity.c_str(), 100 * error, choice.error / error, choice.seconds_spent, choice.seconds);
+    std::printf("%s, %.1f %% asked: cells of %.3f mm, %.2f %% estimated of %s, true error %.3f %% (ratio %.1f), %.2f s to "
+                "choose, %.2f s to run\n",
+                name, 100 * asked, 1e3 * choice.cell, 100 * choice.error, choice.quantity.c_str(), 100 * error,
+                choice.error / error, choice.seconds_spent, choice.seconds);
     EXPECT_LE(choice.error, asked);
     EXPECT_LE(error, asked + known_to) << name;
     EXPECT_LE(error, choice.error + known_to) << name;

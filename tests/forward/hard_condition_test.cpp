@@ -80,7 +80,8 @@ Scene cracked(const Vec2& start, const Vec2& tip) {
 }
 
 TEST(HardCondition, TheTangentHereIsTheSolvers) {
-    // Its quadratic form is twice the energy that the solver knows of, less that of the held sides: moved by the solver's own step.
+    // Its quadratic form is twice the energy that the solver knows of, less that of the held sides: moved by the solver's own
+    // step.
     const AtRest run(cracked({0.0, 10.3e-3}, {10.4e-3, 9.7e-3}));
     ASSERT_TRUE(run.solved());
     Scene still = run.scene;
@@ -97,7 +98,8 @@ TEST(HardCondition, TheTangentHereIsTheSolvers) {
         for (int axis = 0; axis < 2; ++axis)
             if (mass[f] > 0.0 && !held[f][axis]) u[count++] = run.equilibrium.displacements()[f][axis];
     ASSERT_EQ(count, K.rows());
-    hard_case("tangent put together here", "quadratic form is twice the solver's energy", 0.5 * u.dot(K * u) / run.equilibrium.strain_energy() - 1, 1e-9);
+    hard_case("tangent put together here", "quadratic form is twice the solver's energy",
+              0.5 * u.dot(K * u) / run.equilibrium.strain_energy() - 1, 1e-9);
 }
 
 TEST(HardCondition, AsACrackSweepsAcrossACell) {
@@ -108,7 +110,8 @@ TEST(HardCondition, AsACrackSweepsAcrossACell) {
     const auto sweep = [&](const std::string& name, auto scene_at) {
         double worst = 0.0;
         double where = 0.0;
-        for (const double s : {0.0, 1e-9, 1e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.05, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.751, 0.755, 0.77, 0.8, 0.9, 0.999, 1.0}) {
+        for (const double s : {0.0, 1e-9, 1e-4, 1e-3, 2e-3, 5e-3,  0.01,  0.05, 0.1, 0.2, 0.25,  0.3,
+                               0.4, 0.5,  0.6,  0.7,  0.75, 0.751, 0.755, 0.77, 0.8, 0.9, 0.999, 1.0}) {
             const double factor = condition(stiffness(AtRest(scene_at(s)))) / uncut;
             if (factor > worst) where = s;
             worst = std::max(worst, factor);
@@ -121,8 +124,10 @@ TEST(HardCondition, AsACrackSweepsAcrossACell) {
     sweep("tip sweeps along a grid line", [&](double s) { return cracked({0.0, 10 * h}, {(10 + s) * h, 10 * h}); });
     sweep("level crack sweeps up", [&](double s) { return cracked({0.0, (10 + s) * h}, {10.4 * h, (10 + s) * h}); });
     sweep("slanted crack sweeps up", [&](double s) { return cracked({0.0, (6 + s) * h}, {10.4 * h, (12.1 + s) * h}); });
-    sweep("tip sweeps along a slanted crack", [&](double s) { return cracked({0.0, 6.2 * h}, {(10 + s) * h, (12.2 + 0.62 * s) * h}); });
+    sweep("tip sweeps along a slanted crack", [&](double s) {
+        return cracked({0.0, 6.2 * h}, {(10 + s) * h, (12.2 + 0.62 * s) * h});
+    });
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

@@ -37,8 +37,14 @@ double tip_error(const Vec2& place, double angle) {
 }
 
 TEST(HardTip, OnNodesLinesAndPointsAndAHairOff) {
-    struct Place { const char* name; Vec2 at; };
-    for (const Place& place : {Place{"a node", {0, 0}}, {"a grid line across", {0, 0.37}}, {"a grid line along", {0.37, 0}}, {"a point", {0.25, 0.25}}}) {
+    struct Place {
+        const char* name;
+        Vec2 at;
+    };
+    for (const Place& place : {Place{"a node", {0, 0}},
+                               {"a grid line across", {0, 0.37}},
+                               {"a grid line along", {0.37, 0}},
+                               {"a point", {0.25, 0.25}}}) {
         for (const double angle : {0.0, 37.0}) {
             const double there = tip_error(place.at, angle);
             double worst = there;
@@ -55,7 +61,8 @@ TEST(HardTip, OnNodesLinesAndPointsAndAHairOff) {
 }
 
 TEST(HardField, OnePointBehindIt) {
-    // Of 400 places and turns of the crack, those whose smallest field has a single point, in the far corner of the node's support.
+    // Of 400 places and turns of the crack, those whose smallest field has a single point, in the far corner of the node's
+    // support.
     int found = 0;
     double worst = 0.0, least_share = 1.0;
     for (int k = 0; k < 400; ++k) {
@@ -86,7 +93,8 @@ TEST(HardField, OnePointBehindIt) {
         }
     }
     ASSERT_EQ(found, 12);
-    hard_case(fmt::format("fields with one point, {:.4f} of a node's mass", least_share), "exact G of 12 Griffith cracks that have such fields, worst", worst, 0.02);
+    hard_case(fmt::format("fields with one point, {:.4f} of a node's mass", least_share),
+              "exact G of 12 Griffith cracks that have such fields, worst", worst, 0.02);
 }
 
 // ---- along lines and boundaries
@@ -107,18 +115,21 @@ TEST(HardCrackLine, AlongAGridLineAndAHairOff) {
                 if (std::abs(off) > std::abs(worst)) worst = off;
             }
         }
-        hard_case(angle == 0.0 ? "crack along a grid line" : "crack along an upright grid line", "exact G, on the line and 1e-12 to 1e-3 of a cell off: worst", worst, 0.02);
+        hard_case(angle == 0.0 ? "crack along a grid line" : "crack along an upright grid line",
+                  "exact G, on the line and 1e-12 to 1e-3 of a cell off: worst", worst, 0.02);
     }
 }
 
-// A strip between grips with a crack at this height: whatever the height, G is what is stored far ahead (REFERENCES: strip), even where
-// the wood above the crack is another than that below.
+// A strip between grips with a crack at this height: whatever the height, G is what is stored far ahead (REFERENCES: strip), even
+// where the wood above the crack is another than that below.
 struct Strip {
     double height_of_crack = 5e-3;  // [m]
     double contrast = 1.0;          // E of the upper half over that of the lower
 };
 
-struct StripErrors { double G, potential; };
+struct StripErrors {
+    double G, potential;
+};
 
 StripErrors strip_errors(const Strip& strip) {
     const double h = 1e-3, length = 60e-3, height = 10e-3, pull = 1e-5;
@@ -158,7 +169,8 @@ TEST(HardCrackLine, WithinACellOfAGrip) {
     for (const double below : {1.0, 0.6, 0.5, 0.3}) {
         for (const bool top : {true, false}) {
             const StripErrors errors = strip_errors({top ? 10e-3 - below * 1e-3 : below * 1e-3});
-            hard_case(fmt::format("crack {:.1f} of a cell from the {} grip", below, top ? "upper" : "lower"), "energy released over two cells is that stored far ahead", errors.potential, 0.02);
+            hard_case(fmt::format("crack {:.1f} of a cell from the {} grip", below, top ? "upper" : "lower"),
+                      "energy released over two cells is that stored far ahead", errors.potential, 0.02);
         }
     }
 }
@@ -171,7 +183,8 @@ TEST(HardBand, LatewoodOneCellWide) {
         strip.cell = 0.5e-3;
         strip.lift = lift;
         const RingMeans means = over_one_ring(strip);
-        hard_case(fmt::format("latewood one cell wide, 30:1, crack {:.1f} cells up", lift), "energy released over a whole ring is that stored in one ahead", means.potential, 0.02);
+        hard_case(fmt::format("latewood one cell wide, 30:1, crack {:.1f} cells up", lift),
+                  "energy released over a whole ring is that stored in one ahead", means.potential, 0.02);
     }
 }
 
@@ -180,7 +193,8 @@ TEST(HardContrast, LaminatedStrip) {
         LaminatedStrip strip;
         strip.contrast = contrast;
         const RingMeans means = over_one_ring(strip);
-        hard_case(fmt::format("stiffness contrast {:.0f}", contrast), "energy released over a whole ring is that stored in one ahead", means.potential, 0.02);
+        hard_case(fmt::format("stiffness contrast {:.0f}", contrast),
+                  "energy released over a whole ring is that stored in one ahead", means.potential, 0.02);
     }
 }
 
@@ -194,16 +208,19 @@ TEST(HardContrast, LayersInARowWhereverTheyLieInTheCells) {
             scene.specimen.material.clear();
             scene.specimen.rings = Rings{Vec2(1e-3, -1000.0 + shift * h), period, 0.25, 0.0};
             scene.materials["LW"] = {contrast * 40e6, 0.33, 900.0, 100.0};
-            scene.edges = {moving("top", Side::top, {0.0, pull}), moving("bottom", Side::bottom, {0.0, 0.0}), without(moving("left", Side::left, {0.0, 0.0}), 1),
+            scene.edges = {moving("top", Side::top, {0.0, pull}), moving("bottom", Side::bottom, {0.0, 0.0}),
+                           without(moving("left", Side::left, {0.0, 0.0}), 1),
                            without(moving("right", Side::right, {0.0, 0.0}), 1)};
             scene.measure = {"top", "top"};
             const AtRest run(scene);
             ASSERT_TRUE(run.solved());
             const double M = 40e6 * 0.67 / (1.33 * 0.34);
-            const double exact = pull / (height * (0.75 / M + 0.25 / (contrast * M))) * 2e-3;  // whole rings: shifted or not, five of them
+            // Whole rings: shifted or not, five of them.
+            const double exact = pull / (height * (0.75 / M + 0.25 / (contrast * M))) * 2e-3;
             worst = std::max(worst, std::abs(run.equilibrium.reactions()[0].y() / exact - 1));
         }
-        hard_case(fmt::format("layers in a row, contrast {:.0f}", contrast), "exact force, boundaries anywhere in the cells: worst", worst, 0.005);
+        hard_case(fmt::format("layers in a row, contrast {:.0f}", contrast),
+                  "exact force, boundaries anywhere in the cells: worst", worst, 0.005);
     }
 }
 
@@ -211,7 +228,9 @@ TEST(HardContrast, LayersInARowWhereverTheyLieInTheCells) {
 
 TEST(HardPoisson, CentreCrackAtNearlyHalf) {
     // Missed: cells of four points lock as the wood gets incompressible. The gates stand at what is reached.
-    struct Reached { double cells, G, K_I; };
+    struct Reached {
+        double cells, G, K_I;
+    };
     for (const auto& [cells, G, K_I] : {Reached{10, 0.19, 0.065}, {20, 0.09, 0.03}}) {
         SlantedCrack plate;
         plate.cells = cells;
@@ -223,7 +242,8 @@ TEST(HardPoisson, CentreCrackAtNearlyHalf) {
         const TipLoad load = run.load();
         const double K = remote_stress * std::sqrt(std::numbers::pi * plate.half_length);
         const std::string name = fmt::format("nu = 0.499, {:.0f} cells per half crack", cells);
-        hard_case(name, "exact G of a Griffith crack", load.G / griffith_rate(plate.half_length, 40e6 / (1 - 0.499 * 0.499)) - 1, 0.02, G);
+        hard_case(name, "exact G of a Griffith crack", load.G / griffith_rate(plate.half_length, 40e6 / (1 - 0.499 * 0.499)) - 1,
+                  0.02, G);
         hard_case(name, "exact K_I", load.K_I / K - 1, 0.02, K_I);
     }
 }
@@ -238,8 +258,12 @@ struct TwoCracks {
         const double k = std::sqrt(1 - b * b / (c * c));
         return c * c * std::comp_ellint_2(k) / std::comp_ellint_1(k);
     }
-    double inner_K() const { return remote_stress * std::sqrt(std::numbers::pi / b) * (C_squared() - b * b) / std::sqrt(c * c - b * b); }
-    double outer_K() const { return remote_stress * std::sqrt(std::numbers::pi / c) * (c * c - C_squared()) / std::sqrt(c * c - b * b); }
+    double inner_K() const {
+        return remote_stress * std::sqrt(std::numbers::pi / b) * (C_squared() - b * b) / std::sqrt(c * c - b * b);
+    }
+    double outer_K() const {
+        return remote_stress * std::sqrt(std::numbers::pi / c) * (c * c - C_squared()) / std::sqrt(c * c - b * b);
+    }
     Mat2 stress(const Vec2& x) const {
         using Complex = std::complex<double>;
         const Complex z(x.x(), x.y());
@@ -254,8 +278,8 @@ struct TwoCracks {
 };
 
 TEST(HardTwoCracks, NearlyMeeting) {
-    // Each 20 cells long. 2 % as long as the domain in which G is measured finds room between the tips. It shrinks to two cells, where
-    // it sees little but the tip's own cell: G is low by a sixth then, and of the grid only with one cell left.
+    // Each 20 cells long. 2 % as long as the domain in which G is measured finds room between the tips. It shrinks to two cells,
+    // where it sees little but the tip's own cell: G is low by a sixth then, and of the grid only with one cell left.
     const double h = 0.5e-3, length = 20 * h;
     for (const double gap : {12.0, 5.0, 4.0, 2.0, 1.0}) {
         const TwoCracks exact{0.5 * gap * h, 0.5 * gap * h + length};
@@ -282,5 +306,5 @@ TEST(HardTwoCracks, NearlyMeeting) {
     }
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

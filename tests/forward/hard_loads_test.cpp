@@ -1,4 +1,5 @@
-// Hard cases of loading: wheels on corners and smaller than a cell, specimens that nothing holds, toughness out of all proportion.
+// Hard cases of loading: wheels on corners and smaller than a cell, specimens that nothing holds, toughness out of all
+// proportion.
 #include "datasets/error.hpp"
 #include "forward/simulate.hpp"
 #include "tests/forward/cracked_plates.hpp"
@@ -17,10 +18,12 @@ Body wheel(std::string name, Vec2 centre, double radius, Vec2 velocity) {
     return body;
 }
 
-Vec2 push_of(const StaticTrial& run, int body) { return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body]; }
+Vec2 push_of(const StaticTrial& run, int body) {
+    return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
+}
 
-// Slope of the potential with time over the power of what prescribes motion, less one: they are the same at equilibrium. By central
-// differences over a hundredth of the travel.
+// Slope of the potential with time over the power of what prescribes motion, less one: they are the same at equilibrium. By
+// central differences over a hundredth of the travel.
 double slope_against_power(StaticTrial& run, double time) {
     double potential[2];
     for (const int side : {0, 1}) {
@@ -32,8 +35,8 @@ double slope_against_power(StaticTrial& run, double time) {
 }
 
 TEST(HardWheel, OnASharpCorner) {
-    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself, until
-    // the corner gives way to one side, at 0.62 mm on cells of 0.5 mm.
+    // Down the diagonal onto the upper left corner of a square whose lower and right sides are held: the mirror image of itself,
+    // until the corner gives way to one side, at 0.62 mm on cells of 0.5 mm.
     for (const double cell : {0.5e-3, 0.2e-3}) {
         const double radius = 1e-3;
         Scene scene = at_rest({10e-3, 10e-3}, cell);
@@ -51,7 +54,8 @@ TEST(HardWheel, OnASharpCorner) {
     }
 }
 
-// A V notch with flanks of slope 2 from 3 mm deep in 10 x 10 mm, two wheels on them 1 mm below the top, which go down by 1 mm a second.
+// A V notch with flanks of slope 2 from 3 mm deep in 10 x 10 mm, two wheels on them 1 mm below the top, which go down by 1 mm a
+// second.
 Scene notched(double radius, double cell) {
     const double half = std::atan(0.5), deep = 3e-3;
     Scene scene = at_rest({10e-3, 10e-3}, cell);
@@ -141,7 +145,8 @@ TEST(HardToughness, SoSmallThatTheCrackRunsAtOnce) {
         const double exact = 10e-3 * std::sqrt(toughness / (modulus * 5e-3));  // REFERENCES: strip
         const std::string name = fmt::format("toughness {:.0e} J/m^2", toughness);
         ASSERT_FALSE(record.driving.empty());
-        hard_case(name, "displacement at which the crack runs, exact for a strip", record.driving.front().displacement / exact - 1, 0.01);
+        hard_case(name, "displacement at which the crack runs, exact for a strip",
+                  record.driving.front().displacement / exact - 1, 0.01);
         hard_case(name, "it ends split", record.status == RunStatus::split ? 0.0 : 1.0, 0.0);
         hard_case(name, "toughness times new face", record.series.back().fracture_energy / (toughness * 40e-3) - 1, 1e-6);
     }
@@ -153,7 +158,8 @@ TEST(HardToughness, SoLargeThatTheCrackNeverMoves) {
         const Instant &half = record.series[record.series.size() / 2], &end = record.series.back();
         const std::string name = fmt::format("toughness {:.0e} J/m^2", toughness);
         hard_case(name, "the crack stays as long as it was", end.crack_length / 20e-3 - 1, 1e-12);
-        hard_case(name, "force proportional to displacement", end.force / half.force / (end.displacement / half.displacement) - 1, 1e-9);
+        hard_case(name, "force proportional to displacement", end.force / half.force / (end.displacement / half.displacement) - 1,
+                  1e-9);
         hard_case(name, "work is strain energy", end.external_work / end.strain_energy - 1, 1e-9);
         hard_case(name, "it ends at its displacement", end.displacement / 1e-5 - 1, 1e-9);
     }
@@ -176,18 +182,20 @@ TEST(HardToughness, UnderWheels) {
         const Record record = simulate(scene);
         const Instant& end = record.series.back();
         const std::string name = fmt::format("wedge, toughness {:.0e} J/m^2", toughness);
-        std::printf("   %s: %s, crack %.3f mm at %.6f mm\n", name.c_str(), crampfit::name(record.status), 1e3 * end.crack_length, 1e3 * end.displacement);
+        std::printf("   %s: %s, crack %.3f mm at %.6f mm\n", name.c_str(), crampfit::name(record.status), 1e3 * end.crack_length,
+                    1e3 * end.displacement);
         if (toughness > 1.0) {
             hard_case(name, "the crack stays as long as it was", end.crack_length / 1e-3 - 1, 1e-12);
             hard_case(name, "it ends at its displacement", end.displacement / 0.1e-3 - 1, 1e-9);
         } else {
             // Energy given off by then is at most what came in by the wheels, and the crack has run most of the way.
-            const auto first = std::find_if(record.series.begin(), record.series.end(), [](const Instant& row) { return row.crack_length > 4e-3; });
+            const auto first = std::find_if(record.series.begin(), record.series.end(),
+                                            [](const Instant& row) { return row.crack_length > 4e-3; });
             ASSERT_NE(first, record.series.end());
             hard_case(name, "it has run four times its length by a thousandth of the travel", first->displacement / 0.1e-3, 1e-3);
         }
     }
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

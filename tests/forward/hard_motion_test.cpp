@@ -46,7 +46,8 @@ TEST(HardTurning, ByNinetyDegreesAndByTenTurns) {
         Motion run(scene, true);
         const Vec2 middle(5e-3, 5e-3);
         const double rate = 2 * pi * 400.0;  // [rad/s]; the corners move at 18 m/s
-        run.solver->start([](const Vec2&) { return Vec2::Zero(); }, [&](const Vec2& x) { return Vec2(rate * left_of(x - middle)); });
+        run.solver->start([](const Vec2&) { return Vec2::Zero(); },
+                          [&](const Vec2& x) { return Vec2(rate * left_of(x - middle)); });
         run.steps(1);
         const double at_start = run.energy();
         // The mean of the gradient over the square: how far it has turned, and how much it is stretched.
@@ -69,12 +70,15 @@ TEST(HardTurning, ByNinetyDegreesAndByTenTurns) {
             if (quarter || angle < 0.5 * pi) continue;
             quarter = true;
             hard_case(fmt::format("{}, 90 degrees", name), "energy kept", run.energy() / at_start - 1, 1e-4);
-            hard_case(fmt::format("{}, 90 degrees", name), "stretch below the centrifugal bound", (mean().stretch - Mat2::Identity()).norm(), centrifugal);
+            hard_case(fmt::format("{}, 90 degrees", name), "stretch below the centrifugal bound",
+                      (mean().stretch - Mat2::Identity()).norm(), centrifugal);
         }
         const double lasted = run.solver->time();
         hard_case(fmt::format("{}, 10 turns", name), "energy kept", run.energy() / at_start - 1, 1e-4);
-        hard_case(fmt::format("{}, 10 turns", name), "stretch below the centrifugal bound", (mean().stretch - Mat2::Identity()).norm(), centrifugal);
-        hard_case(fmt::format("{}, 10 turns", name), "time of ten turns, longer by no more than the stretch", lasted * rate / (20 * pi) - 1, 2 * centrifugal);
+        hard_case(fmt::format("{}, 10 turns", name), "stretch below the centrifugal bound",
+                  (mean().stretch - Mat2::Identity()).norm(), centrifugal);
+        hard_case(fmt::format("{}, 10 turns", name), "time of ten turns, longer by no more than the stretch",
+                  lasted * rate / (20 * pi) - 1, 2 * centrifugal);
     }
 }
 
@@ -132,8 +136,8 @@ TEST(HardStep, NearTheLimit) {
         run.steps(1);
         const double at_start = run.energy();
         run.steps(20000);
-        hard_case(shape == ShapeFunction::gimp ? "0.99 of the time step's limit, 20000 steps" : "the same, B-splines", "energy kept",
-                  run.energy() / at_start - 1, 1e-9);
+        hard_case(shape == ShapeFunction::gimp ? "0.99 of the time step's limit, 20000 steps" : "the same, B-splines",
+                  "energy kept", run.energy() / at_start - 1, 1e-9);
     }
 }
 
@@ -147,7 +151,8 @@ TEST(SlowHardCrossing, HundredThousandSteps) {
     scene.solver.kind = SolverKind::explicit_dynamics;
     scene.stop.time = 1.0;
     Motion run(scene, true);
-    run.solver->start([](const Vec2&) { return Vec2::Zero(); }, [](const Vec2& x) { return Vec2(4.0 * std::sin(pi * x.x() / 50.0), 0.0); });
+    run.solver->start([](const Vec2&) { return Vec2::Zero(); },
+                      [](const Vec2& x) { return Vec2(4.0 * std::sin(pi * x.x() / 50.0), 0.0); });
     run.steps(1);
     const double at_start = run.energy();
     double most = 0.0;
@@ -182,8 +187,9 @@ TEST(HardImpact, AtTwentyMetresASecond) {
 }
 
 TEST(HardContrast, WaveComesOutOfWoodAThousandTimesStiffer) {
-    // A plane wave in latewood meets earlywood a thousandth as stiff, which then moves at 2 Z / (Z + Z_earlywood) times the speed of the
-    // wood behind the wave, Z = rho c (Graff 1975, chapter 2). The rings' pith is so far away that the boundary is straight.
+    // A plane wave in latewood meets earlywood a thousandth as stiff, which then moves at 2 Z / (Z + Z_earlywood) times the speed
+    // of the wood behind the wave, Z = rho c (Graff 1975, chapter 2). The rings' pith is so far away that the boundary is
+    // straight.
     const double length = 50e-3, v = 1.0;
     Scene scene = block({length, 1e-3}, 0.25e-3);
     scene.specimen.material.clear();
@@ -212,5 +218,5 @@ TEST(HardContrast, WaveComesOutOfWoodAThousandTimesStiffer) {
     hard_case("contrast 1000 in motion", "energy books", (books.work - books.strain - books.kinetic) / books.work, 0.01);
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

@@ -33,7 +33,8 @@ Scene bar(const Material& wood, PlaneCondition plane, const Edge& load) {
     Scene scene = at_rest({4e-3, 2e-3}, 1e-3);
     scene.model.plane = plane;
     scene.materials["EW"] = wood;
-    scene.edges = {without(moving("left", Side::left, {0.0, 0.0}), 1), without(moving("bottom", Side::bottom, {0.0, 0.0}), 0), load};
+    scene.edges = {without(moving("left", Side::left, {0.0, 0.0}), 1), without(moving("bottom", Side::bottom, {0.0, 0.0}), 0),
+                   load};
     scene.measure = {load.name, load.name};
     return scene;
 }
@@ -66,10 +67,12 @@ TEST(VerificationHistory, RelaxationOfABar) {
         const auto integral = [&](double t) { return t - share * (t + tau * std::expm1(-t / tau)); };
         double worst = 0.0;
         for (const Instant& row : record.series) {
-            const double exact = bar_modulus(plane) * 2e-3 * strain / ramp * (integral(row.time) - integral(std::max(0.0, row.time - ramp)));
+            const double exact =
+                bar_modulus(plane) * 2e-3 * strain / ramp * (integral(row.time) - integral(std::max(0.0, row.time - ramp)));
             worst = std::max(worst, std::abs(row.force - exact) / (bar_modulus(plane) * 2e-3 * strain));
         }
-        std::printf("relaxation: %zu rows, worst force off by %.1e; books off by %.1e\n", record.series.size(), worst, record.worst_energy_imbalance);
+        std::printf("relaxation: %zu rows, worst force off by %.1e; books off by %.1e\n", record.series.size(), worst,
+                    record.worst_energy_imbalance);
         EXPECT_LT(worst, 1e-7);  // what Newton's method leaves
         EXPECT_LT(record.worst_energy_imbalance, 5e-3);
         expect_dissipation_rises(record);
@@ -78,8 +81,8 @@ TEST(VerificationHistory, RelaxationOfABar) {
 
 double creep(double share, double tau, double time) { return 1 + share / (1 - share) * -std::expm1(-(1 - share) * time / tau); }
 
-// Under a load from the start on: u = sigma L / E' (1 + g / (1 - g) (1 - exp(-(1 - g) t / tau))), and the error goes with the square of
-// the step.
+// Under a load from the start on: u = sigma L / E' (1 + g / (1 - g) (1 - exp(-(1 - g) t / tau))), and the error goes with the
+// square of the step.
 TEST(VerificationHistory, CreepOfABar) {
     const double share = 0.6, tau = 0.7, stress = 0.1e6;
     for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
@@ -88,7 +91,8 @@ TEST(VerificationHistory, CreepOfABar) {
         const auto worst = [&](const Record& record) {
             double most = 0.0;
             for (const Instant& row : record.series)
-                most = std::max(most, std::abs(row.displacement / (stress * 4e-3 / bar_modulus(plane)) - creep(share, tau, row.time)));
+                most = std::max(most,
+                                std::abs(row.displacement / (stress * 4e-3 / bar_modulus(plane)) - creep(share, tau, row.time)));
             return most;
         };
         const Record automatic = simulate(scene);
@@ -97,8 +101,8 @@ TEST(VerificationHistory, CreepOfABar) {
             scene.solver.time_step = 0.2 / (1 << k);
             error[k] = worst(simulate(scene));
         }
-        std::printf("creep: %zu rows, off by %.1e; even steps of 0.2 s and halves: %.1e %.1e %.1e; books off by %.1e\n", automatic.series.size(),
-                    worst(automatic), error[0], error[1], error[2], automatic.worst_energy_imbalance);
+        std::printf("creep: %zu rows, off by %.1e; even steps of 0.2 s and halves: %.1e %.1e %.1e; books off by %.1e\n",
+                    automatic.series.size(), worst(automatic), error[0], error[1], error[2], automatic.worst_energy_imbalance);
         EXPECT_LT(worst(automatic), 5e-4);
         EXPECT_GT(std::log2(error[0] / error[1]), 1.9);
         EXPECT_GT(std::log2(error[1] / error[2]), 1.9);
@@ -130,19 +134,21 @@ TEST(VerificationHistory, RelaxationAndCreepInMotion) {
         const Record loaded = simulate(scene);
         for (const Instant& row : loaded.series)
             if (row.time > tau)
-                creeping = std::max(creeping, std::abs(row.displacement / (0.1e6 * 4e-3 / bar_modulus(plane)) / creep(share, tau, row.time) - 1));
-        std::printf("in motion: relaxation off by %.1e, creep by %.1e; books off by %.1e, %.1e\n", relaxation, creeping, held.worst_energy_imbalance,
-                    loaded.worst_energy_imbalance);
+                creeping = std::max(
+                    creeping, std::abs(row.displacement / (0.1e6 * 4e-3 / bar_modulus(plane)) / creep(share, tau, row.time) - 1));
+        std::printf("in motion: relaxation off by %.1e, creep by %.1e; books off by %.1e, %.1e\n", relaxation, creeping,
+                    held.worst_energy_imbalance, loaded.worst_energy_imbalance);
         EXPECT_LT(relaxation, 2e-3);
         EXPECT_LT(creeping, 5e-3);
         EXPECT_LT(held.worst_energy_imbalance, 5e-3);
-        EXPECT_LT(loaded.worst_energy_imbalance, 1e-2);  // half a step's damping of the wave that the sudden load sends; elastic wood has it too
+        EXPECT_LT(loaded.worst_energy_imbalance,
+                  1e-2);  // half a step's damping of the wave that the sudden load sends; elastic wood has it too
         expect_dissipation_rises(held);
     }
 }
 
-// A wheel that follows a force sinks as it would into elastic wood of E over the creep function, as long as what it touches grows (Lee and
-// Radok 1960; Poisson's ratio stays what it is).
+// A wheel that follows a force sinks as it would into elastic wood of E over the creep function, as long as what it touches grows
+// (Lee and Radok 1960; Poisson's ratio stays what it is).
 TEST(VerificationHistory, WheelSinksIn) {
     const double share = 0.6, tau = 0.7;
     std::array<double, 2> worst{};
@@ -165,17 +171,20 @@ TEST(VerificationHistory, WheelSinksIn) {
             scene.materials["EW"].youngs_modulus /= creep(share, tau, time);
             const Record elastic = simulate(scene);
             ASSERT_EQ(creeping.status, RunStatus::finished) << creeping.message;
-            worst[fineness] = std::max(worst[fineness], std::abs(creeping.series.back().displacement / elastic.series.back().displacement - 1));
+            worst[fineness] =
+                std::max(worst[fineness], std::abs(creeping.series.back().displacement / elastic.series.back().displacement - 1));
             EXPECT_LT(creeping.worst_energy_imbalance, 1e-3);
         }
     }
     std::printf("wheel: depth off by %.1e, with cells half as wide by %.1e\n", worst[0], worst[1]);
-    // Springs on the outline are as stiff as the wood at once, and those of the softer wood softer: their depth goes with the cell.
+    // Springs on the outline are as stiff as the wood at once, and those of the softer wood softer: their depth goes with the
+    // cell.
     EXPECT_LT(worst[0], 0.01);
     EXPECT_LT(worst[1], 0.6 * worst[0]);
 }
 
-// Free vibration dies out as s of rho s^2 + k^2 E'(s) = 0 has it, E'(s) = E' (1 - g / (1 + s tau)): loss angle and stiffness in one.
+// Free vibration dies out as s of rho s^2 + k^2 E'(s) = 0 has it, E'(s) = E' (1 - g / (1 + s tau)): loss angle and stiffness in
+// one.
 TEST(VerificationHistory, VibrationDiesOut) {
     const double share = 0.1, L = 25e-3;
     const double M = 40e6 * 0.67 / (1.33 * 0.34), k = pi / (2 * L);  // sides on rollers: plane waves
@@ -192,11 +201,12 @@ TEST(VerificationHistory, VibrationDiesOut) {
         s = std::sqrt(-omega * omega * (1.0 - share / (1.0 + s * tau)));
         if (s.imag() < 0) s = -s;
     }
-    // As the mode itself goes, the springs of the Maxwell elements would have to start strained; from rest they follow in tau, so that
-    // amplitude and phase are compared over later periods.
+    // As the mode itself goes, the springs of the Maxwell elements would have to start strained; from rest they follow in tau, so
+    // that amplitude and phase are compared over later periods.
     Trial run(scene);
     const double v0 = 1e-3;
-    run.solver.start([](const Vec2&) { return Vec2::Zero(); }, [&](const Vec2& x) { return Vec2(v0 * std::sin(k * x.x()), 0.0); });
+    run.solver.start([](const Vec2&) { return Vec2::Zero(); },
+                     [&](const Vec2& x) { return Vec2(v0 * std::sin(k * x.x()), 0.0); });
     const int end = run.body.layout.nodes_x() - 1;
     std::vector<double> crossing, peak;
     double before = 0.0, most = 0.0;
@@ -215,7 +225,8 @@ TEST(VerificationHistory, VibrationDiesOut) {
     ASSERT_GE(crossing.size(), 8U);
     const double measured = (crossing[7] - crossing[3]) / 4;
     const double decrement = std::log(peak[3] / peak[7]) / 4;
-    std::printf("vibration: period off by %.1e, decrement %.5f (exact %.5f)\n", measured / period - 1, decrement, -s.real() * period);
+    std::printf("vibration: period off by %.1e, decrement %.5f (exact %.5f)\n", measured / period - 1, decrement,
+                -s.real() * period);
     EXPECT_NEAR(measured / period, 1.0, 3e-4);
     EXPECT_NEAR(decrement / (-s.real() * period), 1.0, 3e-3);
     const EnergyBooks books = run.solver.energies();
@@ -249,8 +260,10 @@ TEST(VerificationHistory, PlasticBar) {
     const Record record = simulate(scene);
     double off = 0.0;
     for (const Instant& row : record.series)
-        if (row.displacement > 0.01 * 4e-3) off = std::max(off, std::abs(row.force / 2e-3 - virgin((row.displacement - 0.5 * last * 4e-6) / 4e-3)));
-    std::printf("plastic bar in motion: stress off by %.1e of the yield stress; books off by %.1e\n", off / Y, record.worst_energy_imbalance);
+        if (row.displacement > 0.01 * 4e-3)
+            off = std::max(off, std::abs(row.force / 2e-3 - virgin((row.displacement - 0.5 * last * 4e-6) / 4e-3)));
+    std::printf("plastic bar in motion: stress off by %.1e of the yield stress; books off by %.1e\n", off / Y,
+                record.worst_energy_imbalance);
     EXPECT_LT(off, 0.02 * Y);  // what vibration and damping leave
     EXPECT_LT(record.worst_energy_imbalance, 1e-3);
     expect_dissipation_rises(record);
@@ -263,7 +276,8 @@ TEST(VerificationHistory, BlockInPlaneStrainCarriesItsLimit) {
     const Record record = simulate(scene);
     ASSERT_EQ(record.status, RunStatus::finished) << record.message;
     const double limit = 2 / std::sqrt(3.0) * Y * 2e-3;
-    std::printf("limit load off by %.1e; books off by %.1e\n", record.series.back().force / limit - 1, record.worst_energy_imbalance);
+    std::printf("limit load off by %.1e; books off by %.1e\n", record.series.back().force / limit - 1,
+                record.worst_energy_imbalance);
     EXPECT_NEAR(record.series.back().force, limit, 1e-3 * limit);
     EXPECT_LT(record.worst_energy_imbalance, 5e-3);
     scene = at_motion(scene);
@@ -271,14 +285,16 @@ TEST(VerificationHistory, BlockInPlaneStrainCarriesItsLimit) {
     scene.stop.time = 4e-3;
     scene.solver.damping = 4e4;
     const Record moving = simulate(scene);
-    std::printf("in motion off by %.1e; books off by %.1e\n", moving.series.back().force / limit - 1, moving.worst_energy_imbalance);
+    std::printf("in motion off by %.1e; books off by %.1e\n", moving.series.back().force / limit - 1,
+                moving.worst_energy_imbalance);
     EXPECT_NEAR(moving.series.back().force, limit, 0.02 * limit);
 }
 
 // Between rollers, an elastic layer on one that relaxes, the boundary within a cell: two in series, a standard solid again.
 TEST(VerificationHistory, LayersThatShareACellActInSeries) {
     const double M1 = 1200e6 * 0.67 / (1.33 * 0.34), M2 = 40e6 * 0.67 / (1.33 * 0.34);
-    const double G2 = 40e6 / 2.66, share = 0.6, tau = 0.5, height = 4e-3, h2 = 2.3125e-3, h1 = height - h2, ramp = 1e-4, stretch = 4e-6;
+    const double G2 = 40e6 / 2.66, share = 0.6, tau = 0.5, height = 4e-3, h2 = 2.3125e-3, h1 = height - h2, ramp = 1e-4,
+                 stretch = 4e-6;
     Scene scene = at_rest({2e-3, height}, 1e-3);
     scene.specimen.material.clear();
     // LW from y = h2 on, the pith so far away that the boundary is straight.
@@ -403,7 +419,8 @@ TEST(GradientHistory, TangentAndTurningOfCells) {
         }
 }
 
-// Layers that all flow at the same shear stress, without hardening, slide along their boundary: any way to share the slip is as good.
+// Layers that all flow at the same shear stress, without hardening, slide along their boundary: any way to share the slip is as
+// good.
 TEST(UnitHistory, LayersMayAllFlow) {
     Scene scene = ring_specimen(3e-3, 0.8e-3);
     scene.materials["EW"] = flowing(0.4e6, 0.0);
@@ -435,7 +452,8 @@ TEST(UnitHistory, LayersAreElasticAtOnce) {
     history.go_to(0.0);
     int remembering = 0;
     for (int c = 0; c < body.layout.cells(); ++c) {
-        const bool has_earlywood = materials.shares(body.layout.cell_corner(c) + 0.5 * body.layout.cell, 0.5 * body.layout.cell)[0] > 0.0;
+        const bool has_earlywood =
+            materials.shares(body.layout.cell_corner(c) + 0.5 * body.layout.cell, 0.5 * body.layout.cell)[0] > 0.0;
         EXPECT_EQ(history.is_in(c), has_earlywood);
         if (!history.is_in(c)) continue;
         ++remembering;
@@ -450,8 +468,9 @@ TEST(UnitHistory, LayersAreElasticAtOnce) {
     EXPECT_LT(remembering, body.layout.cells());
 }
 
-// Of perfectly plastic wood between rough platens, no wider than high, the limit is the same (Hill 1950, ch. 9): it is reached only where
-// points may flow without a change of volume, and else the load rises without end. The platens' corners leave an error of first order.
+// Of perfectly plastic wood between rough platens, no wider than high, the limit is the same (Hill 1950, ch. 9): it is reached
+// only where points may flow without a change of volume, and else the load rises without end. The platens' corners leave an error
+// of first order.
 TEST(VerificationHistory, RoughBlockComesToItsLimit) {
     for (const double cell : {0.5e-3, 0.25e-3}) {
         Scene scene = at_rest({4e-3, 4e-3}, cell);
@@ -466,14 +485,15 @@ TEST(VerificationHistory, RoughBlockComesToItsLimit) {
         }
         after = -run.equilibrium.reactions()[1].y();
         const double limit = 2 / std::sqrt(3.0) * 0.4e6 * 4e-3;
-        std::printf("rough block, cell %g mm: limit off by %.1e, rises by %.1e over the last fifth\n", cell * 1e3, after / limit - 1, after / before - 1);
+        std::printf("rough block, cell %g mm: limit off by %.1e, rises by %.1e over the last fifth\n", cell * 1e3,
+                    after / limit - 1, after / before - 1);
         EXPECT_NEAR(after, limit, 0.05 * cell / 0.5e-3 * limit);
         EXPECT_LT(after / before - 1, 2e-3);
     }
 }
 
-// A cantilever of perfectly plastic wood comes to its plastic moment Y h^2 / 4 (2 / sqrt(3) of it in plane strain) at the grip, which
-// keeps the wood beside it from flowing, so that the hinge lies some part of the height away from it.
+// A cantilever of perfectly plastic wood comes to its plastic moment Y h^2 / 4 (2 / sqrt(3) of it in plane strain) at the grip,
+// which keeps the wood beside it from flowing, so that the hinge lies some part of the height away from it.
 TEST(VerificationHistory, CantileverComesToItsPlasticMoment) {
     const double L = 40e-3, h = 4e-3, Y = 0.4e6;
     for (const PlaneCondition plane : {PlaneCondition::stress, PlaneCondition::strain}) {
@@ -495,7 +515,8 @@ TEST(VerificationHistory, CantileverComesToItsPlasticMoment) {
 TEST(VerificationHistory, ComesToElasticWood) {
     for (const PlaneCondition plane : {PlaneCondition::strain, PlaneCondition::stress}) {
         Scene scene = at_equilibrium(ring_specimen(3e-3, 0.5e-3));
-        scene.specimen.rings = Rings{Vec2(-1000.0, 5e-3), 2e-3, 0.25, 0.0};  // bands of one cell: elastic cells of two woods know where each lies
+        // Bands of one cell: elastic cells of two woods know where each lies.
+        scene.specimen.rings = Rings{Vec2(-1000.0, 5e-3), 2e-3, 0.25, 0.0};
         scene.model.plane = plane;
         scene.edges[0].velocity[1] = 1e-4;
         scene.edges[0].until = 1.0;
@@ -516,8 +537,8 @@ TEST(VerificationHistory, ComesToElasticWood) {
     }
 }
 
-// Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in elastic
-// wood, and the books close. Where nothing relaxes it is elastic wood.
+// Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in
+// elastic wood, and the books close. Where nothing relaxes it is elastic wood.
 TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
     Scene scene = block({10e-3, 10e-3}, 0.4e-3);
     scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
@@ -530,17 +551,20 @@ TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
     scene.solver.damping = 1e4;
     scene.stop.displacement = 0.25e-3;
     const auto first_growth = [](const Record& record) {
-        return std::find_if(record.series.begin(), record.series.end(), [&](const Instant& row) { return row.crack_length > 2.6e-3; })->displacement;
+        return std::find_if(record.series.begin(), record.series.end(),
+                            [&](const Instant& row) { return row.crack_length > 2.6e-3; })
+            ->displacement;
     };
     const Record elastic = simulate(scene);
     scene.materials["EW"] = relaxing(0.5, 1e6);
     const Record slow = simulate(scene);
     EXPECT_NEAR(slow.series.back().crack_length, elastic.series.back().crack_length, 1e-6 * 5e-3);
-    EXPECT_NEAR(slow.series.back().external_work, elastic.series.back().external_work, 1e-6 * elastic.series.back().external_work);
+    EXPECT_NEAR(slow.series.back().external_work, elastic.series.back().external_work,
+                1e-6 * elastic.series.back().external_work);
     scene.materials["EW"] = relaxing(0.5, 1e-3);
     const Record relaxed = simulate(scene);
-    std::printf("first growth at %.4f mm in elastic wood, %.4f mm in viscoelastic; books off by %.1e\n", first_growth(elastic) * 1e3,
-                first_growth(relaxed) * 1e3, relaxed.worst_energy_imbalance);
+    std::printf("first growth at %.4f mm in elastic wood, %.4f mm in viscoelastic; books off by %.1e\n",
+                first_growth(elastic) * 1e3, first_growth(relaxed) * 1e3, relaxed.worst_energy_imbalance);
     EXPECT_GT(first_growth(relaxed), 1.005 * first_growth(elastic));
     EXPECT_LT(relaxed.worst_energy_imbalance, 0.01);
     const Instant& last = relaxed.series.back();
@@ -614,7 +638,8 @@ TEST(UnitHistory, Refusals) {
     refuses(other, "stop");
 }
 
-// Steps begin with a twentieth of the relaxation time wherever the load changes, and come to what stops, to frames and to the end.
+// Steps begin with a twentieth of the relaxation time wherever the load changes, and come to what stops, to frames and to the
+// end.
 TEST(UnitMarch, Times) {
     Scene scene = bar(relaxing(0.5, 0.01), PlaneCondition::strain, pull(1e-6, 0.3));
     scene.output.frames = 3;
@@ -664,7 +689,8 @@ TEST(UnitMarch, FramesAndProbes) {
     scene.output.probes.instants = {moved(0.5), moved(1.5)};
     const Record by_displacement = simulate(scene);
     ASSERT_EQ(by_displacement.probes.size(), 2U);
-    for (int k = 0; k < 2; ++k) EXPECT_NEAR(by_displacement.probes[k].moved[0].x(), scene.output.probes.instants[k], 1e-6 * moved(0.0));
+    for (int k = 0; k < 2; ++k)
+        EXPECT_NEAR(by_displacement.probes[k].moved[0].x(), scene.output.probes.instants[k], 1e-6 * moved(0.0));
 }
 
 }  // namespace

@@ -16,9 +16,11 @@ struct LaminatedStrip {
     double start = 10e-3;    // crack length before the ring that it crosses, whole rings [m]
 };
 
-/// What a crack gives off over one whole ring, over the energy that was stored in a ring far ahead, less one: by the change of the
-/// potential, by G at each half cell, and by K.
-struct RingMeans { double potential, G, K; };
+/// What a crack gives off over one whole ring, over the energy that was stored in a ring far ahead, less one: by the change of
+/// the potential, by G at each half cell, and by K.
+struct RingMeans {
+    double potential, G, K;
+};
 
 inline RingMeans over_one_ring(const LaminatedStrip& strip) {
     const double half_height = 3e-3;
@@ -56,4 +58,4 @@ inline RingMeans over_one_ring(const LaminatedStrip& strip) {
     return {(before - run.equilibrium.potential()) / ahead - 1, G / ahead - 1, K / ahead - 1};
 }
 
-} // namespace crampfit::test
+}  // namespace crampfit::test

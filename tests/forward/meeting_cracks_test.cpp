@@ -1,4 +1,5 @@
-// Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were alone.
+// Cracks that meet edges, holes, corners and each other: what is cut free carries nothing, and what is left carries as if it were
+// alone.
 #include "forward/cracks.hpp"
 #include "forward/simulate.hpp"
 #include "tests/forward/cracked_plates.hpp"
@@ -60,7 +61,8 @@ TEST(HardMeeting, ACrackThatRunsIntoAnotherCutsABlockFree) {
             // What the block leaves has a slit of 3 mm above it, which a cutout of the block has not.
             Scene alone = scene;
             alone.cracks = {line({8, 10 + lift}, {8, 13})};
-            alone.specimen.cutouts = {Polygon{{{-1e-3, -1e-3}, {8e-3, -1e-3}, {8e-3, (10 + lift) * 1e-3}, {-1e-3, (10 + lift) * 1e-3}}}};
+            alone.specimen.cutouts = {
+                Polygon{{{-1e-3, -1e-3}, {8e-3, -1e-3}, {8e-3, (10 + lift) * 1e-3}, {-1e-3, (10 + lift) * 1e-3}}}};
             alone.edges[1].range = {{7.9e-3, 20e-3}};
             alone.stop.displacement = 1e-5;
             const double left = stiffness_at_the_end(simulate(alone));
@@ -74,12 +76,13 @@ TEST(HardMeeting, ACrackThatRunsIntoAnotherCutsABlockFree) {
 TEST(HardMeeting, TwoEdgeCracksMeetHeadOn) {
     for (const double shift : {0.0, 0.37}) {
         for (const double right : {14.0, 15.5}) {
-            const Record record = simulate(square({line({0, 10 + shift}, {6, 10 + shift}, Growth::end),
-                                                   line({20, 10 + shift}, {right, 10 + shift}, Growth::end)}));
+            const Record record = simulate(square(
+                {line({0, 10 + shift}, {6, 10 + shift}, Growth::end), line({20, 10 + shift}, {right, 10 + shift}, Growth::end)}));
             EXPECT_EQ(record.status, RunStatus::split) << record.message;
             const Instant& end = record.series.back();
             const double grown = end.crack_length + record.cracks[0].length.back();
-            const std::string name = fmt::format("edge cracks head on, {:.2f} mm off a grid line, ligament {:.1f} mm", shift, right - 6);
+            const std::string name =
+                fmt::format("edge cracks head on, {:.2f} mm off a grid line, ligament {:.1f} mm", shift, right - 6);
             hard_case(name, "together as long as the specimen is wide", grown / 20e-3 - 1, 1e-9);
             hard_case(name, "nothing is carried", end.force, 1e-9);
             hard_case(name, "toughness times new face is spent", end.fracture_energy / (0.1 * (right - 6) * 1e-3) - 1, 1e-6);
@@ -107,8 +110,9 @@ TEST(HardMeeting, CracksThatPassEachOtherCurveIn) {
     const double end = record.series.back().force;
     double most = 0.0;
     for (const Instant& row : record.series) most = std::max(most, row.force);
-    std::printf("en passant: %s, lengths %.2f and %.2f mm, force at the end %.2e of the peak, %ld equilibria\n", name(record.status),
-                1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back(), end / most, record.steps);
+    std::printf("en passant: %s, lengths %.2f and %.2f mm, force at the end %.2e of the peak, %ld equilibria\n",
+                name(record.status), 1e3 * record.series.back().crack_length, 1e3 * record.cracks[0].length.back(), end / most,
+                record.steps);
     EXPECT_NE(record.status, RunStatus::unstable) << record.message;
     EXPECT_LT(end, 0.02 * most);
     for (const Instant& row : record.series) EXPECT_GE(row.strain_energy, -1e-12);
@@ -118,9 +122,10 @@ TEST(HardMeeting, CrossesThatCutAPlateInFourCarryNothing) {
     for (const double angle : {0.0, 31.0}) {
         const Vec2 along(std::cos(angle * degree), std::sin(angle * degree)), across(-along.y(), along.x());
         const Vec2 centre(10.3, 9.8);
-        const Record record = simulate(
-            square({line(centre - 40 * along, centre + 40 * along), line(centre - 40 * across, centre + 40 * across)}));
-        hard_case(fmt::format("cracks through a plate that cross, {:.0f} deg", angle), "nothing is carried", record.series.back().force, 1e-9);
+        const Record record =
+            simulate(square({line(centre - 40 * along, centre + 40 * along), line(centre - 40 * across, centre + 40 * across)}));
+        hard_case(fmt::format("cracks through a plate that cross, {:.0f} deg", angle), "nothing is carried",
+                  record.series.back().force, 1e-9);
     }
 }
 
@@ -162,7 +167,8 @@ TEST(HardMeeting, AClosedCrackAcrossAnotherChangesNothing) {
         const AtRest run(scene);
         ASSERT_TRUE(run.solved());
         const double exact = 1e5 * 1e5 * std::numbers::pi * 10e-3 / plane_modulus();
-        hard_case(fmt::format("a closed crack across a Griffith crack, {:.1f} cells off a node", offset), "exact G", run.load().G / exact - 1, 0.02);
+        hard_case(fmt::format("a closed crack across a Griffith crack, {:.1f} cells off a node", offset), "exact G",
+                  run.load().G / exact - 1, 0.02);
     }
 }
 
@@ -177,7 +183,8 @@ TEST(HardMeeting, ACrackLeavesThroughACorner) {
         const std::string name = fmt::format("a diagonal crack, {:.1f} mm off the corner", off);
         EXPECT_EQ(record.status, RunStatus::split) << record.message;
         hard_case(name, "nothing is carried", record.series.back().force, 1e-9);
-        hard_case(name, "it ends at the corner", record.series.back().crack_length / ((20 - off) * std::sqrt(2.0) * 1e-3) - 1, 1e-6);
+        hard_case(name, "it ends at the corner", record.series.back().crack_length / ((20 - off) * std::sqrt(2.0) * 1e-3) - 1,
+                  1e-6);
     }
 }
 

@@ -47,7 +47,8 @@ struct Point {
 double shear_modulus(const Material& m) { return m.youngs_modulus / (2 * (1 + m.poisson_ratio)); }
 double bulk_modulus(const Material& m) { return m.youngs_modulus / (3 * (1 - 2 * m.poisson_ratio)); }
 
-/// int_0^t M(s) ds of M(t) = M0 [1 - sum m_i (1 - exp(-t / tau_i))], so that a strain that goes evenly from 0 has this stress per rate.
+/// int_0^t M(s) ds of M(t) = M0 [1 - sum m_i (1 - exp(-t / tau_i))], so that a strain that goes evenly from 0 has this stress per
+/// rate.
 template <class Share>
 double integrated(double modulus, const Material& material, double t, const Share& share) {
     double sum = t;
@@ -55,8 +56,8 @@ double integrated(double modulus, const Material& material, double t, const Shar
     return modulus * sum;
 }
 
-// The recursion is exact where strain goes evenly between the ends of steps, whatever their length: a ramp, then a hold, in uneven steps,
-// against the convolution of the moduli.
+// The recursion is exact where strain goes evenly between the ends of steps, whatever their length: a ramp, then a hold, in
+// uneven steps, against the convolution of the moduli.
 TEST(VerificationMemoryLaw, RampAndHoldAreTheConvolution) {
     const Material wood = viscoelastic();
     const Strain full(0.01, -0.004, 0.006);
@@ -72,15 +73,16 @@ TEST(VerificationMemoryLaw, RampAndHoldAreTheConvolution) {
         const double shear = both(shear_modulus(wood), [](const PronyTerm& t) { return t.g; });
         const double bulk = both(bulk_modulus(wood), [](const PronyTerm& t) { return t.k; });
         const double mean = (full[0] + full[1]) / 3;
-        const Strain expected(3 * bulk * mean + 2 * shear * (full[0] - mean), 3 * bulk * mean + 2 * shear * (full[1] - mean), shear * full[2]);
+        const Strain expected(3 * bulk * mean + 2 * shear * (full[0] - mean), 3 * bulk * mean + 2 * shear * (full[1] - mean),
+                              shear * full[2]);
         worst = std::max(worst, (found.stress - expected).norm() / expected.norm());
     }
     std::printf("ramp and hold: worst error %.1e\n", worst);
     EXPECT_LT(worst, 1e-13);
 }
 
-// In a closed cycle of small strain the dashpots take pi E'' e0^2, with the loss modulus of the series (Ferry 1980, eq. 3.27); stress and
-// strain leave a loss angle atan(E'' / E').
+// In a closed cycle of small strain the dashpots take pi E'' e0^2, with the loss modulus of the series (Ferry 1980, eq. 3.27);
+// stress and strain leave a loss angle atan(E'' / E').
 TEST(VerificationMemoryLaw, HarmonicLoss) {
     const Material wood = viscoelastic();
     const double omega = 1.3, e0 = 0.01;
@@ -109,7 +111,8 @@ TEST(VerificationMemoryLaw, HarmonicLoss) {
     }
 }
 
-// Work = stored + dissipated: of a ramp, with the work from the convolution's exact integral int s de = rate^2 int_0^T (T - t) M(t) dt.
+// Work = stored + dissipated: of a ramp, with the work from the convolution's exact integral int s de = rate^2 int_0^T (T - t)
+// M(t) dt.
 TEST(VerificationMemoryLaw, ViscousWorkIsStoredOrDissipated) {
     const Material wood = viscoelastic();
     const double T = 3.0, rate = 0.01;
@@ -125,7 +128,8 @@ TEST(VerificationMemoryLaw, ViscousWorkIsStoredOrDissipated) {
     }
 }
 
-// Uniaxial stress in plane stress, yielding and back: bilinear with E H / (E + H), unloading with E (isotropic hardening, no saturation).
+// Uniaxial stress in plane stress, yielding and back: bilinear with E H / (E + H), unloading with E (isotropic hardening, no
+// saturation).
 TEST(VerificationMemoryLaw, BarYieldsUnloadsYieldsAgain) {
     Material wood = plastic(8e6);
     wood.plastic->saturation.reset();
@@ -146,7 +150,8 @@ TEST(VerificationMemoryLaw, BarYieldsUnloadsYieldsAgain) {
     };
     const double first = 0.06, back = 0.02, last = 0.1;
     const double at_first = Y + tangent * (first - Y / E);
-    for (double e = 0.005; e <= first; e += 0.005) worst = std::max(worst, std::abs(pull(e) - std::min(E * e, Y + tangent * (e - Y / E))));
+    for (double e = 0.005; e <= first; e += 0.005)
+        worst = std::max(worst, std::abs(pull(e) - std::min(E * e, Y + tangent * (e - Y / E))));
     worst = std::max(worst, std::abs(pull(back) - (at_first - E * (first - back))));
     worst = std::max(worst, std::abs(pull(first) - at_first));
     worst = std::max(worst, std::abs(pull(last) - (at_first + tangent * (last - first))));
@@ -180,7 +185,9 @@ TEST(GradientMemoryLaw, TangentIsTheSlopeOfTheStress) {
             Eigen::Matrix3d differences;
             const double h = 1e-6;
             for (int k = 0; k < 3; ++k)
-                differences.col(k) = (Point(start).go(here + h * Strain::Unit(k), 0.7).stress - Point(start).go(here - h * Strain::Unit(k), 0.7).stress) / (2 * h);
+                differences.col(k) = (Point(start).go(here + h * Strain::Unit(k), 0.7).stress -
+                                      Point(start).go(here - h * Strain::Unit(k), 0.7).stress) /
+                                     (2 * h);
             EXPECT_LT((tangent - differences).norm(), 1e-7 * tangent.norm());
             EXPECT_LT((tangent - tangent.transpose()).norm(), 1e-12 * tangent.norm());
         }
@@ -211,7 +218,8 @@ TEST(UnitMemoryLaw, IsElasticAtOnce) {
         }
 }
 
-// Simple shear that turns the axes of strain, then a turn by 90 degrees and by ten turns as a whole: the stress turns with the point.
+// Simple shear that turns the axes of strain, then a turn by 90 degrees and by ten turns as a whole: the stress turns with the
+// point.
 TEST(VerificationMemoryLaw, TurningLeavesTheStress) {
     for (const Material& wood : {viscoelastic(), plastic()}) {
         Point point(wood, PlaneCondition::strain);

@@ -131,7 +131,8 @@ TEST(HardMovingCrack, TurnsWhereItHasJustCutAPair) {
     ASSERT_NE(record.status, RunStatus::unstable) << record.message;
     const Instant& last = record.series.back();
     const double books = last.strain_energy + last.kinetic_energy + last.fracture_energy;
-    std::printf("turned from the grid line: %s, books off by %+.2f %% of the work\n", name(record.status), 100 * (books / last.external_work - 1));
+    std::printf("turned from the grid line: %s, books off by %+.2f %% of the work\n", name(record.status),
+                100 * (books / last.external_work - 1));
     EXPECT_LT(std::abs(books / last.external_work - 1), 0.01);
     EXPECT_GE(last.crack_length, 18e-3 * (1 - 1e-9));
 }

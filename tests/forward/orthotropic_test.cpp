@@ -22,9 +22,12 @@ Material wood(const OrthotropicElasticity& elasticity = softwood()) { return {0.
 Vec2 toward(double angle) { return {std::cos(angle), std::sin(angle)}; }
 
 const std::pair<const char*, std::pair<ElasticConstant, double OrthotropicElasticity::*>> constants[] = {
-    {"E_R", {ElasticConstant::E_R, &OrthotropicElasticity::E_R}},       {"E_T", {ElasticConstant::E_T, &OrthotropicElasticity::E_T}},
-    {"G_RT", {ElasticConstant::G_RT, &OrthotropicElasticity::G_RT}},    {"nu_RT", {ElasticConstant::nu_RT, &OrthotropicElasticity::nu_RT}},
-    {"E_L", {ElasticConstant::E_L, &OrthotropicElasticity::E_L}},       {"nu_LR", {ElasticConstant::nu_LR, &OrthotropicElasticity::nu_LR}},
+    {"E_R", {ElasticConstant::E_R, &OrthotropicElasticity::E_R}},
+    {"E_T", {ElasticConstant::E_T, &OrthotropicElasticity::E_T}},
+    {"G_RT", {ElasticConstant::G_RT, &OrthotropicElasticity::G_RT}},
+    {"nu_RT", {ElasticConstant::nu_RT, &OrthotropicElasticity::nu_RT}},
+    {"E_L", {ElasticConstant::E_L, &OrthotropicElasticity::E_L}},
+    {"nu_LR", {ElasticConstant::nu_LR, &OrthotropicElasticity::nu_LR}},
     {"nu_LT", {ElasticConstant::nu_LT, &OrthotropicElasticity::nu_LT}}};
 
 // --- Stiffness
@@ -65,7 +68,8 @@ TEST(UnitElasticity, EqualConstantsAllWaysAreIsotropic) {
     }
 }
 
-// Worst difference between the slope by a constant and central differences of 1e-5 of it (error of the differences 1e-10), over the slope.
+// Worst difference between the slope by a constant and central differences of 1e-5 of it (error of the differences 1e-10), over
+// the slope.
 template <class Change>
 double slope_error(const Material& material, PlaneCondition plane, ElasticConstant constant, double value, Change change) {
     const double step = 1e-5 * value;
@@ -91,14 +95,17 @@ TEST(GradientElasticity, EveryConstant) {
             EXPECT_LT(error, 1e-9) << name;
         }
         const Material isotropic{40e6, 0.33, 300.0, 100.0};
-        EXPECT_LT(slope_error(isotropic, plane, ElasticConstant::E, 40e6, [](Material& m, double v) { m.youngs_modulus = v; }), 1e-9);
-        EXPECT_LT(slope_error(isotropic, plane, ElasticConstant::nu, 0.33, [](Material& m, double v) { m.poisson_ratio = v; }), 1e-9);
+        EXPECT_LT(slope_error(isotropic, plane, ElasticConstant::E, 40e6, [](Material& m, double v) { m.youngs_modulus = v; }),
+                  1e-9);
+        EXPECT_LT(slope_error(isotropic, plane, ElasticConstant::nu, 0.33, [](Material& m, double v) { m.poisson_ratio = v; }),
+                  1e-9);
     }
 }
 
 TEST(UnitElasticity, LayeredFormComesBack) {
     const Eigen::Matrix3d C = from_axes(plane_stiffness(wood(), PlaneCondition::strain), toward(0.4));
-    for (const double angle : {0.0, 0.4, 1.0, 2.5}) EXPECT_LT((layered(C, toward(angle)).stiffness() - C).norm(), 1e-13 * C.norm());
+    for (const double angle : {0.0, 0.4, 1.0, 2.5})
+        EXPECT_LT((layered(C, toward(angle)).stiffness() - C).norm(), 1e-13 * C.norm());
 }
 
 TEST(UnitElasticity, RayleighWaveOfIsotropicWood) {
@@ -141,9 +148,12 @@ TEST(VerificationOrthotropicPatch, StressOnTheSidesStrainsAsTheTurnedComplianceS
         for (const double angle : {0.0, 15.0, 45.0, 77.0, 120.0}) {
             for (const Mat2& stress : {pull, shear}) {
                 Scene scene = plate(angle * degree, plane);
-                scene.edges = {pulled("top", Side::top, stress.col(1)), pulled("bottom", Side::bottom, -stress.col(1)),
-                               pulled("right", Side::right, stress.col(0)), pulled("left", Side::left, -stress.col(0)),
-                               held_at("hinge", Side::left, 4e-3, 1e-3, 0.0, 0.0), held_at("slide", Side::right, 4e-3, 1e-3, std::nullopt, 0.0)};
+                scene.edges = {pulled("top", Side::top, stress.col(1)),
+                               pulled("bottom", Side::bottom, -stress.col(1)),
+                               pulled("right", Side::right, stress.col(0)),
+                               pulled("left", Side::left, -stress.col(0)),
+                               held_at("hinge", Side::left, 4e-3, 1e-3, 0.0, 0.0),
+                               held_at("slide", Side::right, 4e-3, 1e-3, std::nullopt, 0.0)};
                 const AtRest run(scene);
                 ASSERT_TRUE(run.solved());
                 const Vec2 r = toward(angle * degree);
@@ -166,14 +176,17 @@ TEST(VerificationOrthotropicPatch, StressOutOfThePlane) {
     const Scene scene = plate(30 * degree, PlaneCondition::strain);
     const Discretisation body(scene, map);
     // Pulled along R by 1 Pa: nu_LR along L; along T: nu_LT.
-    const auto out = [&](const Vec2& n) { return body.points.out_of_plane[0].dot(Eigen::Vector3d(n.x() * n.x(), n.y() * n.y(), n.x() * n.y())); };
+    const auto out = [&](const Vec2& n) {
+        return body.points.out_of_plane[0].dot(Eigen::Vector3d(n.x() * n.x(), n.y() * n.y(), n.x() * n.y()));
+    };
     EXPECT_NEAR(out(toward(30 * degree)), softwood().nu_LR, 1e-14);
     EXPECT_NEAR(out(toward(120 * degree)), softwood().nu_LT, 1e-14);
 }
 
 // --- Cracks
 
-// Lekhnitskii's roots in the axes of a crack that lies `turn` counter-clockwise from R (roots turned as in Lekhnitskii 1963, sec. 7).
+// Lekhnitskii's roots in the axes of a crack that lies `turn` counter-clockwise from R (roots turned as in Lekhnitskii 1963, sec.
+// 7).
 std::array<std::complex<double>, 2> lekhnitskii_roots(const Eigen::Matrix3d& a, double turn) {
     using Complex = std::complex<double>;
     const double half = (2 * a(0, 1) + a(2, 2)) / (2 * a(0, 0)), last = a(1, 1) / a(0, 0);
@@ -187,8 +200,8 @@ std::array<std::complex<double>, 2> lekhnitskii_roots(const Eigen::Matrix3d& a, 
     return roots;
 }
 
-// Stress around a crack from -a to a on the x axis of an infinite anisotropic plate (Sih, Paris and Irwin 1965): that of the near-tip
-// field with z / (z^2 - a^2)^1/2 in place of (a / 2 z)^1/2, and the stress along the crack that is missing far away.
+// Stress around a crack from -a to a on the x axis of an infinite anisotropic plate (Sih, Paris and Irwin 1965): that of the
+// near-tip field with z / (z^2 - a^2)^1/2 in place of (a / 2 z)^1/2, and the stress along the crack that is missing far away.
 struct AnisotropicGriffith {
     std::array<std::complex<double>, 2> roots;
 
@@ -201,7 +214,8 @@ struct AnisotropicGriffith {
         };
         const Complex f1 = f(s1), f2 = f(s2), d = 1.0 / (s1 - s2), both = s1 * s2;
         const double s = remote(1, 1), t = remote(0, 1);
-        const double xx = s * (both * d * (s2 * f2 - s1 * f1) + both).real() + t * (d * (s2 * s2 * f2 - s1 * s1 * f1) + s1 + s2).real();
+        const double xx =
+            s * (both * d * (s2 * f2 - s1 * f1) + both).real() + t * (d * (s2 * s2 * f2 - s1 * s1 * f1) + s1 + s2).real();
         const double yy = s * (d * (s1 * f2 - s2 * f1)).real() + t * (d * (f2 - f1)).real();
         const double xy = s * (both * d * (f1 - f2)).real() + t * (d * (s1 * f1 - s2 * f2)).real();
         Mat2 stress;
@@ -234,9 +248,9 @@ Scene cracked_wood(const CrackedWood& c) {
 }
 
 TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
-    // Sih, Paris and Irwin 1965: K_I = s_n (pi a)^1/2, K_II = t (pi a)^1/2 whatever the wood, where the faces carry no resultant. Along
-    // an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2. Bars as for isotropic wood, on twice as many
-    // cells: shear as soft as this makes the near-tip field as much steeper.
+    // Sih, Paris and Irwin 1965: K_I = s_n (pi a)^1/2, K_II = t (pi a)^1/2 whatever the wood, where the faces carry no resultant.
+    // Along an axis G = K_I^2 (b11 b22 / 2)^1/2 ((b22 / b11)^1/2 + (2 b12 + b66) / (2 b11))^1/2. Bars as for isotropic wood, on
+    // twice as many cells: shear as soft as this makes the near-tip field as much steeper.
     const double stress = 1e5, a = 10e-3, K0 = stress * std::sqrt(std::numbers::pi * a);
     const Eigen::Matrix3d b = plane_compliance(wood(), PlaneCondition::strain);
     const auto sih = [&](double b11, double b22) {
@@ -260,8 +274,10 @@ TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
             }
             for (const bool at_end : {true, false}) {
                 const TipLoad load = run.load(at_end);
-                std::printf("crack at %4.1f, grain at %5.1f deg, %s: K_I off by %+.2f %%, K_II by %+.2f %% of K0, G by %+.2f %%\n", crack, grain,
-                            at_end ? "end  " : "start", 100 * (load.K_I - K_I) / K0, 100 * (load.K_II - K_II) / K0, 100 * (load.G / G - 1));
+                std::printf(
+                    "crack at %4.1f, grain at %5.1f deg, %s: K_I off by %+.2f %%, K_II by %+.2f %% of K0, G by %+.2f %%\n", crack,
+                    grain, at_end ? "end  " : "start", 100 * (load.K_I - K_I) / K0, 100 * (load.K_II - K_II) / K0,
+                    100 * (load.G / G - 1));
                 EXPECT_NEAR(load.K_I, K_I, 0.02 * K0);
                 EXPECT_NEAR(load.K_II, K_II, 0.02 * K0);
                 EXPECT_NEAR(load.G, G, 0.02 * G);
@@ -271,8 +287,8 @@ TEST(VerificationOrthotropicCrack, KOfTheInfinitePlateIsThatOfIsotropicWood) {
 }
 
 TEST(VerificationOrthotropicCrack, GIsTheLossOfPotentialPerCrackLength) {
-    // -dPi / da by central differences, tractions on the sides held. Over five cells either way, as the tip of a crack oblique to the
-    // grid lies exact to a tenth of a cell.
+    // -dPi / da by central differences, tractions on the sides held. Over five cells either way, as the tip of a crack oblique to
+    // the grid lies exact to a tenth of a cell.
     for (const auto& [crack, grain] : {std::pair{0.0, 40.0}, {30.0, 0.0}, {30.0, 75.0}}) {
         CrackedWood c;
         c.crack = crack * degree;
@@ -289,7 +305,8 @@ TEST(VerificationOrthotropicCrack, GIsTheLossOfPotentialPerCrackLength) {
         }
         c.longer = 0.0;
         const double G = AtRest(cracked_wood(c)).load().G, loss = (potential[0] - potential[1]) / (2 * step);
-        std::printf("crack at %.0f, grain at %.0f deg: G by the domain over -dPi/da: off by %+.2f %%\n", crack, grain, 100 * (G / loss - 1));
+        std::printf("crack at %.0f, grain at %.0f deg: G by the domain over -dPi/da: off by %+.2f %%\n", crack, grain,
+                    100 * (G / loss - 1));
         EXPECT_NEAR(G, loss, 0.02 * loss);
     }
 }
@@ -308,7 +325,8 @@ TEST(VerificationOrthotropicCrack, EqualConstantsRunAsIsotropicWood) {
     Scene scene = edge_crack(0.5e-3);
     const TipLoad isotropic = AtRest(scene).load();
     const double E = earlywood().youngs_modulus, nu = earlywood().poisson_ratio;
-    scene.materials["EW"] = {0.0, 0.0, earlywood().density, earlywood().toughness, OrthotropicElasticity{E, E, 0.5 * E / (1 + nu), nu, E, nu, nu}};
+    scene.materials["EW"] = {0.0, 0.0, earlywood().density, earlywood().toughness,
+                             OrthotropicElasticity{E, E, 0.5 * E / (1 + nu), nu, E, nu, nu}};
     for (const double radial : {0.0, 0.6}) {
         scene.specimen.radial = radial;
         const TipLoad same = AtRest(scene).load();
@@ -338,7 +356,8 @@ TEST(VerificationOrthotropicCrack, GWhereTheGrainTurns) {
     const Vec2 tip = scene.cracks[0].points[1];
     const Mat2 H = near_tip_field(run.materials.at(tip).elasticity.stiffness(), Vec2::UnitX()).release();
     const Vec2 K(load.K_I, load.K_II);
-    std::printf("grain that turns: G over -dPi/da off by %+.2f %%, by K %+.2f %%\n", 100 * (load.G / loss - 1), 100 * (K.dot(H * K) / loss - 1));
+    std::printf("grain that turns: G over -dPi/da off by %+.2f %%, by K %+.2f %%\n", 100 * (load.G / loss - 1),
+                100 * (K.dot(H * K) / loss - 1));
     EXPECT_NEAR(load.G, loss, 0.02 * loss);
     EXPECT_NEAR(K.dot(H * K), loss, 0.02 * loss);
 }
@@ -454,5 +473,5 @@ TEST(SystemOrthotropicDynamics, KeepsItsEnergy) {
     EXPECT_LT(std::abs(imbalance), 1e-3);
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

@@ -1,9 +1,9 @@
 // The crack's walk at equilibrium, and what a rising displacement makes of it: strips, cantilevers, rings, other toughnesses.
+#include "datasets/error.hpp"
 #include "forward/kept_walk.hpp"
 #include "forward/load_peak.hpp"
 #include "forward/quasistatic.hpp"
 #include "forward/trace.hpp"
-#include "datasets/error.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,8 @@ double force_at_displacement(const Record& record, double displacement) {
 // ---- the highest load between two places
 
 TEST(UnitLoadPeak, IsExactWhereTheEnergyIsACubic) {
-    // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2 there.
+    // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2
+    // there.
     const auto needed = [](double x) -> NeededLoad {
         const double d = x - 0.3;
         return {x, std::sqrt(8.0 / (2.0 + d * d + 0.5 * d * d * d)), 8.0};
@@ -313,8 +314,8 @@ TEST(UnitWalk, StopsAreMetExactly) {
 }
 
 TEST(UnitWalk, ACrackLengthAloneStopsIt) {
-    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; one by grips, which is
-    // not linear since nothing says beforehand how far they will go, is refused.
+    // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; one by grips, which
+    // is not linear since nothing says beforehand how far they will go, is refused.
     for (const bool grips : {false, true}) {
         Scene bounded = rings_walk();
         bounded.materials["LW"].toughness = 100.0;
@@ -402,16 +403,20 @@ TEST(GradientWalk, OutputsMoveWithToughness) {
         EXPECT_LT(most, 1.5 * least) << what;
     };
     const auto earlywood = run("EW"), latewood = run("LW");
-    check("latewood, jump from the start", latewood, [](const Record& r) { return displacement_at_length(r, 4.0e-3); }, 0.501);
-    check("earlywood, arrival at 4.95 mm", earlywood, [](const Record& r) { return displacement_at_length(r, 4.95e-3); }, 0.501);
+    check(
+        "latewood, jump from the start", latewood, [](const Record& r) { return displacement_at_length(r, 4.0e-3); }, 0.501);
+    check(
+        "earlywood, arrival at 4.95 mm", earlywood, [](const Record& r) { return displacement_at_length(r, 4.95e-3); }, 0.501);
     check(
         "earlywood, arrival at 6.5 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 6.5e-3); },
         0.501);
     check(
         "earlywood, arrival at 9.0 mm, in a jump", earlywood, [](const Record& r) { return displacement_at_length(r, 9.0e-3); },
         0.501);
-    check("earlywood, force at 0.14 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.14e-3); }, 1.0);
-    check("earlywood, force at 0.18 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.18e-3); }, 1.0);
+    check(
+        "earlywood, force at 0.14 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.14e-3); }, 1.0);
+    check(
+        "earlywood, force at 0.18 mm", earlywood, [](const Record& r) { return force_at_displacement(r, 0.18e-3); }, 1.0);
 }
 
 // ---- walks that are kept

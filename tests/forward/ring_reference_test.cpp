@@ -37,7 +37,8 @@ std::vector<Row> reference_rows() {
 
 TEST(SlowVerificationRings, ReactionWithAndWithoutExtrapolation) {
     const std::vector<Row> rows = reference_rows();
-    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
+    if (rows.empty())
+        GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
     for (const Row& row : rows) {
         double error[2];
         for (const bool extrapolate : {false, true}) {
@@ -74,8 +75,8 @@ Rates rates_of(double crack_length, double cell) {
 
 struct Bars {
     double asked;
-    double left;    // a = 4.5 mm: three cells and a half after it has left latewood, where G falls by 2 % in a tenth of a cell
-    double least;   // a = 5.5 mm, three cells from a boundary
+    double left;   // a = 4.5 mm: three cells and a half after it has left latewood, where G falls by 2 % in a tenth of a cell
+    double least;  // a = 5.5 mm, three cells from a boundary
 };
 
 double bar_of(const Row& row, const Bars& bars) {
@@ -84,7 +85,8 @@ double bar_of(const Row& row, const Bars& bars) {
 
 void check_rates(double cell, const Bars& contour, const Bars& energy) {
     const std::vector<Row> rows = reference_rows();
-    if (rows.empty()) GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
+    if (rows.empty())
+        GTEST_SKIP() << "ring_reference.csv is not here";  // the reference is read beside the project, not part of it
     for (const Row& row : rows) {
         const Rates rates = rates_of(row.crack_length, cell);
         const double reaction = rates.reaction / row.reaction - 1;

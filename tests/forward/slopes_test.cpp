@@ -75,7 +75,8 @@ Errors against_differences(const Scene& scene, KeptWalk& walk, const std::string
     EXPECT_EQ(less.series.size(), far_less.series.size());
     const auto error = [&](auto column) {
         double worst = 0, largest = 0;
-        const std::size_t rows = std::min({more.series.size(), less.series.size(), far_more.series.size(), far_less.series.size()});
+        const std::size_t rows =
+            std::min({more.series.size(), less.series.size(), far_more.series.size(), far_less.series.size()});
         for (std::size_t i = 0; i < rows; ++i) {
             const double slope = (column(more.series[i]) - column(less.series[i])) / (2.0 * small);
             const double difference = (column(far_more.series[i]) - column(far_less.series[i])) / (2.0 * step);
@@ -132,8 +133,9 @@ double force_at(const Record& record, double displacement, bool after) {
 }
 
 TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
-    // At the very displacement of a jump a number that delays it tells the slope of the force before the jump, one that hastens it the
-    // slope after it: the first by one-sided differences of the walk, the second by those of whole runs, (4 f(s) - f(2 s) - 3 f(0)) / 2 s.
+    // At the very displacement of a jump a number that delays it tells the slope of the force before the jump, one that hastens
+    // it the slope after it: the first by one-sided differences of the walk, the second by those of whole runs, (4 f(s) - f(2 s)
+    // - 3 f(0)) / 2 s.
     for (const double advance : {0.8e-3, 0.0}) {
         Scene scene = across_rings(0.4e-3);
         scene.cracks[0].advance = advance;
@@ -143,7 +145,8 @@ TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
         while (jump < base.series.size() && base.series[jump].crack_length - base.series[jump - 1].crack_length < 0.5e-3) ++jump;
         ASSERT_LT(jump, base.series.size());
         const double there = base.series[jump - 1].displacement;
-        for (const std::string& key : {std::string("materials.EW.E"), std::string("materials.EW.nu"), std::string("materials.EW.toughness")}) {
+        for (const std::string& key :
+             {std::string("materials.EW.E"), std::string("materials.EW.nu"), std::string("materials.EW.toughness")}) {
             for (const double side : {1.0, -1.0}) {  // of the number
                 const auto at = [&](double change) {
                     Scene other = scene;
@@ -157,10 +160,13 @@ TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
                 if (after && jump + 1 == base.series.size()) continue;  // it goes right through
                 const double here = base.series[after ? jump : jump - 1].force;
                 const double slope = (force_at(near, there, after) - here) / small;
-                const auto whole = [&](double change) { return force_at(KeptWalk(at(change)).run(at(change), {}), there, after); };
+                const auto whole = [&](double change) {
+                    return force_at(KeptWalk(at(change)).run(at(change), {}), there, after);
+                };
                 const double difference = (4.0 * whole(step) - whole(2.0 * step) - 3.0 * here) / (2.0 * step);
-                std::printf("jump at %.4f mm, advance %.1f mm, %s %s: force %s it goes by %.6f N, by differences %.6f N\n", 1e3 * there, 1e3 * advance,
-                            key.c_str(), side > 0 ? "more" : "less", after ? "after" : "before", slope, difference);
+                std::printf("jump at %.4f mm, advance %.1f mm, %s %s: force %s it goes by %.6f N, by differences %.6f N\n",
+                            1e3 * there, 1e3 * advance, key.c_str(), side > 0 ? "more" : "less", after ? "after" : "before",
+                            slope, difference);
                 EXPECT_NEAR(slope, difference, 1e-5 * std::abs(difference)) << key;
             }
         }

@@ -16,7 +16,8 @@ TEST(VerificationSplineCrack, EnergyReleaseRateAndIntensityFactors) {
     for (const BenchRun& run : bench_runs()) {
         if (run.options.find("B-splines") == std::string::npos || run.cells > 5.0) continue;
         const SpeedError row = measure(run);
-        std::printf("B-splines, %s, %s, %g cells: off by %+.2f %%\n", row.problem.c_str(), row.quantity.c_str(), row.cells, 100 * row.error);
+        std::printf("B-splines, %s, %s, %g cells: off by %+.2f %%\n", row.problem.c_str(), row.quantity.c_str(), row.cells,
+                    100 * row.error);
         EXPECT_LT(std::abs(row.error), 0.04) << row.problem;
         ++runs;
     }
@@ -37,8 +38,8 @@ TEST(VerificationSplineCrack, BooksCloseWhileItGrows) {
     scene.measure = {"top", "top"};
     scene.stop.crack_length = 7e-3;
     const Record record = simulate(scene);
-    std::printf("B-splines, crack grows from 3 to %.2f mm in %ld steps, energy books %.2f %%\n", 1e3 * record.series.back().crack_length,
-                record.steps, 100 * record.worst_energy_imbalance);
+    std::printf("B-splines, crack grows from 3 to %.2f mm in %ld steps, energy books %.2f %%\n",
+                1e3 * record.series.back().crack_length, record.steps, 100 * record.worst_energy_imbalance);
     EXPECT_EQ(record.status, RunStatus::finished) << record.message;
     EXPECT_GT(record.series.back().crack_length, 6.9e-3);
     EXPECT_NEAR(record.series.back().fracture_energy, 100.0 * 4e-3, 0.1 * 100.0 * 4e-3);
@@ -64,5 +65,5 @@ TEST(VerificationSplines, BlockUnderTractionStrainsEvenly) {
     }
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

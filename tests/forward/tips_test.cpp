@@ -1,8 +1,8 @@
 // K_I, K_II and G at crack tips, and the directions in which cracks grow, against exact and handbook values. All at equilibrium,
 // with two points along each side of a cell.
+#include "benchmarks/reference_problems.hpp"
 #include "forward/growth.hpp"
 #include "forward/near_tip_field.hpp"
-#include "benchmarks/reference_problems.hpp"
 #include "tests/forward/cracked_plates.hpp"
 #include "tests/forward/laminated_strip.hpp"
 
@@ -143,7 +143,8 @@ TEST(UnitBranch, StartsAsCotterellAndRiceSay) {
     }
 }
 
-// The way in which a tip in the middle of a 10 mm block turns, in degrees; `side` sets the toughness above the tip over that below.
+// The way in which a tip in the middle of a 10 mm block turns, in degrees; `side` sets the toughness above the tip over that
+// below.
 double turn(GrowthDirection criterion, double K_I, double K_II, double side = 1.0, Vec2 ahead = {1.0, 0.0}) {
     Scene scene = block({10e-3, 10e-3}, 1e-3);
     if (side != 1.0) {
@@ -292,8 +293,8 @@ TEST(VerificationHandbook, ThreePointBend) {
     const AtRest run(scene);
     ASSERT_TRUE(run.solved());
     const double P = -run.equilibrium.reactions()[0].y();
-    const double f = 1.5 * std::sqrt(r) * (1.99 - r * (1 - r) * (2.15 - 3.93 * r + 2.7 * r * r)) /
-                     ((1 + 2 * r) * std::pow(1 - r, 1.5));
+    const double f =
+        1.5 * std::sqrt(r) * (1.99 - r * (1 - r) * (2.15 - 3.93 * r + 2.7 * r * r)) / ((1 + 2 * r) * std::pow(1 - r, 1.5));
     report("three-point bend", run.load(), P * S / std::pow(W, 1.5) * f);
 }
 
@@ -314,7 +315,8 @@ TEST(VerificationHandbook, CompactTension) {
     const AtRest run(scene);
     ASSERT_TRUE(run.solved());
     const double P = run.equilibrium.reactions()[1].y();
-    const double f = (2 + r) * (0.886 + 4.64 * r - 13.32 * r * r + 14.72 * r * r * r - 5.6 * r * r * r * r) / std::pow(1 - r, 1.5);
+    const double f =
+        (2 + r) * (0.886 + 4.64 * r - 13.32 * r * r + 14.72 * r * r * r - 5.6 * r * r * r * r) / std::pow(1 - r, 1.5);
     report("compact tension", run.load(), P / std::sqrt(W) * f);
 }
 
@@ -393,7 +395,8 @@ TEST(VerificationPath, StaysInModeI) {
 void check_laminated_strip(double cell, double lift) {
     const RingMeans means = over_one_ring({.cell = cell, .lift = lift});
     std::printf("laminated strip, %.1f mm cells, crack %.1f cells up: energy released over a ring off by %+.2f %%; "
-                "mean of G by %+.1f %%, of K^2/E' by %+.1f %%\n", 1e3 * cell, lift, 100 * means.potential, 100 * means.G, 100 * means.K);
+                "mean of G by %+.1f %%, of K^2/E' by %+.1f %%\n",
+                1e3 * cell, lift, 100 * means.potential, 100 * means.G, 100 * means.K);
     // Asked: 2 %. G and K at tips within a cell or two of a boundary are the grid's own and are reported only.
     EXPECT_LT(std::abs(means.potential), 0.02);
 }
@@ -406,5 +409,5 @@ TEST(SlowVerificationLaminatedStrip, EnergyOverARing) {
     for (const double lift : {0.0, 0.5}) check_laminated_strip(0.1e-3, lift);
 }
 
-} // namespace
-} // namespace crampfit::test
+}  // namespace
+}  // namespace crampfit::test

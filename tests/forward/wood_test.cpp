@@ -60,7 +60,8 @@ TEST(UnitShapeFunctions, SplinesAddUpToOneAndReproduceALineEverywhere) {
 }
 
 TEST(UnitShapeFunctions, SplinesAreSmoothFromCellToCell) {
-    // Value and slope of the splines that two neighbouring cells share agree at the line between them; also next to the grid's end.
+    // Value and slope of the splines that two neighbouring cells share agree at the line between them; also next to the grid's
+    // end.
     const double h = 0.3;
     for (const bool first : {false, true}) {
         const auto left = spline_weights(h, h, {first, false});
@@ -191,7 +192,8 @@ Scene two_woods(int pixels, const IsLate& is_late) {
 }
 
 TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
-    // Where steps of the edge lie farther apart than the 8 + 2 * 7 pixels that are looked at, no more can be known than that it is straight.
+    // Where steps of the edge lie farther apart than the 8 + 2 * 7 pixels that are looked at, no more can be known than that it
+    // is straight.
     const double least_told = std::atan(1.0 / 22.0) * 180 / M_PI;
     double worst = 0, sum = 0;
     int count = 0;
@@ -212,7 +214,8 @@ TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
 }
 
 TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
-    // Latewood in the right quarter of a cell, h wide and high: strain along the boundary feels the moments of E, of 16 samples a side.
+    // Latewood in the right quarter of a cell, h wide and high: strain along the boundary feels the moments of E, of 16 samples a
+    // side.
     const double h = 1e-3, spread = 0.9, E1 = 40e6, E2 = 1200e6;
     const Scene scene = two_woods(8, [&](const Vec2& x) { return x.x() > 0.75 * h; });
     const MaterialMap materials(scene);
@@ -229,7 +232,8 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
     EXPECT_TRUE(wood.stretch.isZero(0.0));
     // Of the cell's left half: what earlywood is short of the average.
     const Unevenness left = materials.unevenness({0.25 * h, 0.5 * h}, {0.25 * h, 0.5 * h}, average, {0.0, 0.0});
-    const Eigen::Matrix3d early = plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
+    const Eigen::Matrix3d early =
+        plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
     EXPECT_LT((left.stretch - early).norm(), 1e-12 * early.norm());
     EXPECT_TRUE(left.coupling.isZero(1e-12 * coupling.norm()) && left.bending.isZero(0.0));
 }

@@ -45,8 +45,7 @@ cv::Mat noisy() {
 
 std::string big_endian(std::uint32_t value) {
     std::string bytes;
-    for (const int shift : {24, 16, 8, 0})
-        bytes += static_cast<char>(value >> shift & 0xff);
+    for (const int shift : {24, 16, 8, 0}) bytes += static_cast<char>(value >> shift & 0xff);
     return bytes;
 }
 
@@ -60,8 +59,7 @@ std::uint32_t checksum(const std::string& bytes) {
     std::uint32_t remainder = 0xffffffffu;
     for (const char byte : bytes) {
         remainder ^= static_cast<std::uint8_t>(byte);
-        for (int bit = 0; bit < 8; ++bit)
-            remainder = remainder >> 1 ^ (remainder & 1 ? 0xedb88320u : 0u);
+        for (int bit = 0; bit < 8; ++bit) remainder = remainder >> 1 ^ (remainder & 1 ? 0xedb88320u : 0u);
     }
     return ~remainder;
 }
@@ -88,9 +86,8 @@ TEST(UnitBadPicture, CutShortInEveryFormatAtManyLengths) {
         const std::string whole = folder.read(name);
         for (const int percent : {1, 5, 20, 50, 80, 95}) {
             SCOPED_TRACE(std::string(name) + " cut to " + std::to_string(percent) + " %");
-            expect_error(
-                picture_of(folder.write(std::string("cut ") + name, whole.substr(0, whole.size() * percent / 100))),
-                "specimen.image", "cut a", "cut short");
+            expect_error(picture_of(folder.write(std::string("cut ") + name, whole.substr(0, whole.size() * percent / 100))),
+                         "specimen.image", "cut a", "cut short");
         }
     }
 }
@@ -192,8 +189,7 @@ TEST(UnitBadPicture, Classes) {
 TEST(UnitBadPicture, PixelSize) {
     const TemporaryFolder folder;
     cv::imwrite((folder / "a.png").string(), cv::Mat(2, 2, CV_8UC1, cv::Scalar(200)));
-    for (const double pixel :
-         {0.0, -1e-6, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const double pixel : {0.0, -1e-6, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
         Picture picture = picture_of(folder / "a.png");
         picture.pixel = pixel;
         expect_error(picture, "specimen.pixel", " m", "positive");

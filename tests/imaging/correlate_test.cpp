@@ -37,8 +37,7 @@ Errors compare(const PointLattice& lattice, const DisplacementField& field, cons
     int strains = 0;
     for (int point = 0; point < lattice.count(); ++point) {
         const auto i = static_cast<std::size_t>(point);
-        if (field.status[i] != PointStatus::ok)
-            continue;
+        if (field.status[i] != PointStatus::ok) continue;
         const Vec2 place(lattice.x(point), lattice.y(point));
         const Vec2 error = Vec2(field.u[i], field.v[i]) - truth.displacement(place);
         ++errors.followed;
@@ -62,8 +61,9 @@ Errors compare(const PointLattice& lattice, const DisplacementField& field, cons
     return errors;
 }
 
-/// The least standard error of a subset's displacement (root mean square over u, v and the points), from the slopes of a picture without
-/// noise: gray's offset, its gain and the warp are unknown, and both pictures have the noise of their pixels and of rounding [px].
+/// The least standard error of a subset's displacement (root mean square over u, v and the points), from the slopes of a picture
+/// without noise: gray's offset, its gain and the warp are unknown, and both pictures have the noise of their pixels and of
+/// rounding [px].
 double cramer_rao(const FinePicture& clean, const PointLattice& lattice, int subset, int order, double noise) {
     const SplinePicture::Slopes slopes = SplinePicture(clean).slopes();
     const int half = subset / 2, terms = order == 1 ? 3 : 6;
@@ -92,14 +92,11 @@ double cramer_rao(const FinePicture& clean, const PointLattice& lattice, int sub
 }
 
 /// The middle of the picture stays in place.
-PlaneField stretched(double by) {
-    return polynomial_field({256, 256}, {by, 0.3 * by, 0, 0, 0}, {-0.4 * by, -0.5 * by, 0, 0, 0});
-}
+PlaneField stretched(double by) { return polynomial_field({256, 256}, {by, 0.3 * by, 0, 0, 0}, {-0.4 * by, -0.5 * by, 0, 0, 0}); }
 
 /// Strain rises to `most` at the picture's right side.
 PlaneField bent(double most) {
-    return polynomial_field({0, 256}, {0, 0, most / 1024, 0, 0},
-                            {0, -0.3 * most, 0, -0.2 * most / 512, 0.3 * most / 1024});
+    return polynomial_field({0, 256}, {0, 0, most / 1024, 0, 0}, {0, -0.3 * most, 0, -0.2 * most / 512, 0.3 * most / 1024});
 }
 
 void expect_within_bars(const char* what, const PlaneField& truth, int order, double noise) {
@@ -111,11 +108,10 @@ void expect_within_bars(const char* what, const PlaneField& truth, int order, do
     const Correlator correlator(fine(camera.photograph(0)), {}, options, "reference");
     const DisplacementField field = correlator.field(fine(camera.photograph(truth.displacement, 1)));
     const Errors errors = compare(correlator.lattice(), field, truth);
-    std::printf(
-        "%s, order %d, noise %g: bias %.4f %.4f px, rms %.4f px (said: %.4f); strain rms %.0f, worst %.0f microstrain; "
-        "%d of %d followed\n",
-        what, order, noise, errors.bias_u, errors.bias_v, errors.worst_displacement, errors.sigma, 1e6 * errors.strain,
-        1e6 * errors.worst_strain, errors.followed, correlator.lattice().count());
+    std::printf("%s, order %d, noise %g: bias %.4f %.4f px, rms %.4f px (said: %.4f); strain rms %.0f, worst %.0f microstrain; "
+                "%d of %d followed\n",
+                what, order, noise, errors.bias_u, errors.bias_v, errors.worst_displacement, errors.sigma, 1e6 * errors.strain,
+                1e6 * errors.worst_strain, errors.followed, correlator.lattice().count());
     EXPECT_LT(errors.worst_displacement, 0.01);
     EXPECT_LT(errors.strain, 200e-6);
     EXPECT_GT(errors.followed, 0.8 * correlator.lattice().count());  // up to 13 px leave at the sides
@@ -125,8 +121,7 @@ void expect_within_bars(const char* what, const PlaneField& truth, int order, do
 
 // Bars: displacement 0.01 px, strain 200 microstrain.
 TEST(VerificationCorrelate, AffineFieldsUpToFivePercent) {
-    for (const double strain : {0.001, 0.01, 0.05})
-        expect_within_bars("affine", stretched(strain), 1, 1.0);
+    for (const double strain : {0.001, 0.01, 0.05}) expect_within_bars("affine", stretched(strain), 1, 1.0);
     expect_within_bars("affine", stretched(0.05), 2, 1.0);
 }
 
@@ -157,8 +152,8 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
                 const Errors errors =
                     compare(correlator.lattice(), correlator.field(fine(camera.photograph(truth.displacement, 1))), truth);
                 const double bound = cramer_rao(clean, correlator.lattice(), options.subset, order, noise);
-                std::printf("order %d, noise %g, smoothing %g px: scatter %.4f px, said %.4f px, Cramer-Rao %.4f px\n", order, noise, smoothing,
-                            errors.worst_displacement, errors.sigma, bound);
+                std::printf("order %d, noise %g, smoothing %g px: scatter %.4f px, said %.4f px, Cramer-Rao %.4f px\n", order,
+                            noise, smoothing, errors.worst_displacement, errors.sigma, bound);
                 // Interpolation hides a tenth of the noise, and adds some to the slopes.
                 EXPECT_NEAR(errors.sigma / errors.worst_displacement, 1.0, 0.15);
                 if (smoothing == 0) {
@@ -172,8 +167,7 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
 // reference resampled by linear interpolation, which shows fine details up to 0.03 px from where they should be.
 TEST(VerificationCorrelate, PublicShiftedPictures) {
     const std::filesystem::path folder = std::filesystem::path(SHARED_DATA) / "dic";
-    if (!std::filesystem::exists(folder))
-        GTEST_SKIP() << "there is no " << folder;
+    if (!std::filesystem::exists(folder)) GTEST_SKIP() << "there is no " << folder;
     const auto read = [&](const std::string& which) {
         return read_fine_gray(folder / ("trxy_s2_10_" + which + ".tiff"), {"test", "picture"});
     };
@@ -184,8 +178,7 @@ TEST(VerificationCorrelate, PublicShiftedPictures) {
             v(field.v.data(), correlator.lattice().count());
         const double bias_u = u.mean() + 0.1 * i, bias_v = v.mean();
         const double sd_u = std::sqrt((u - u.mean()).square().mean()), sd_v = std::sqrt((v - v.mean()).square().mean());
-        std::printf("shift %.1f px: bias %7.4f %7.4f px, standard deviation %.4f %.4f px\n", 0.1 * i, bias_u, bias_v,
-                    sd_u, sd_v);
+        std::printf("shift %.1f px: bias %7.4f %7.4f px, standard deviation %.4f %.4f px\n", 0.1 * i, bias_u, bias_v, sd_u, sd_v);
         EXPECT_LT(std::abs(bias_u), 0.005);  // not a number where a point was lost: the test then fails
         EXPECT_LT(std::abs(bias_v), 0.005);
         EXPECT_LT(sd_u, 0.01);
@@ -205,8 +198,7 @@ TEST(VerificationCorrelate, SameBitsForAnyNumberOfThreads) {
         std::vector<double> u = Correlator(reference, {}, options, "reference").field(image).u;
         std::ranges::replace_if(
             u, [](double value) { return std::isnan(value); }, -1e9);
-        if (threads == 1)
-            alone = u;
+        if (threads == 1) alone = u;
         EXPECT_EQ(u, alone) << threads << " threads";
     }
 }
@@ -235,12 +227,12 @@ TEST(VerificationCorrelate, NoPointIsFollowedAcrossACrack) {
                 ++others;
                 others_lost += lost ? 1 : 0;
                 if (!lost)
-                    worst = std::max(
-                        worst, (Vec2(field.u[i], field.v[i]) - truth(Vec2(lattice.x(point), lattice.y(point)))).norm());
+                    worst =
+                        std::max(worst, (Vec2(field.u[i], field.v[i]) - truth(Vec2(lattice.x(point), lattice.y(point)))).norm());
             }
         }
-        std::printf("opening %g px: %d of %d over the crack lost, %d of %d others; worst of the others %.3f px\n",
-                    opening, over_lost, over, others_lost, others, worst);
+        std::printf("opening %g px: %d of %d over the crack lost, %d of %d others; worst of the others %.3f px\n", opening,
+                    over_lost, over, others_lost, others, worst);
         EXPECT_EQ(over_lost, over);
         EXPECT_LT(others_lost, 0.05 * others);
         EXPECT_LT(worst, 0.05);
@@ -251,15 +243,12 @@ TEST(UnitCorrelate, NoSubsetReachesOverTheMask) {
     const VirtualCamera camera({.columns = 200, .rows = 150});
     const FinePicture reference = fine(camera.photograph(0));
     std::vector<std::uint8_t> mask(200 * 150, 255);
-    for (std::size_t y = 0; y < 150; ++y)
-        mask[y * 200 + 95] = 0;
+    for (std::size_t y = 0; y < 150; ++y) mask[y * 200 + 95] = 0;
     const Correlator correlator(reference, mask, {}, "reference");
     const DisplacementField field = correlator.field(reference);
     for (int point = 0; point < correlator.lattice().count(); ++point) {
         const int away = std::abs(correlator.lattice().x(point) - 95);
-        const PointStatus expected = away == 0    ? PointStatus::masked
-                                     : away <= 15 ? PointStatus::across_mask
-                                                  : PointStatus::ok;
+        const PointStatus expected = away == 0 ? PointStatus::masked : away <= 15 ? PointStatus::across_mask : PointStatus::ok;
         EXPECT_EQ(field.status[static_cast<std::size_t>(point)], expected) << away;
     }
 }
@@ -268,8 +257,7 @@ TEST(UnitCorrelate, FlatAndUnrelatedPicturesGiveNoPoints) {
     const VirtualCamera camera({.columns = 200, .rows = 150, .noise = 0});
     FinePicture reference = fine(camera.photograph(0));
     for (std::size_t i = 0; i < reference.gray.size(); ++i)
-        if (i % 200 < 100)
-            reference.gray[i] = 90;
+        if (i % 200 < 100) reference.gray[i] = 90;
     const Correlator correlator(reference, {}, {}, "reference");
     const DisplacementField field = correlator.field(reference);
     for (int point = 0; point < correlator.lattice().count(); ++point)
@@ -277,6 +265,5 @@ TEST(UnitCorrelate, FlatAndUnrelatedPicturesGiveNoPoints) {
                   correlator.lattice().x(point) + 15 < 100 ? PointStatus::no_contrast : PointStatus::ok);
 
     const VirtualCamera other({.columns = 200, .rows = 150, .seed = 2});
-    for (const PointStatus status : correlator.field(fine(other.photograph(0))).status)
-        EXPECT_NE(status, PointStatus::ok);
+    for (const PointStatus status : correlator.field(fine(other.photograph(0))).status) EXPECT_NE(status, PointStatus::ok);
 }

@@ -25,8 +25,7 @@ class VirtualTest {
 
     CrackTip tip(const PlaneDisplacement& displacement) {
         const DisplacementField field = correlator_.field(fine(camera_.photograph(displacement, ++shot_)));
-        return find_crack_tip({correlator_.lattice(), CorrelateOptions().subset, options_.columns, options_.rows},
-                              field);
+        return find_crack_tip({correlator_.lattice(), CorrelateOptions().subset, options_.columns, options_.rows}, field);
     }
 
   private:
@@ -53,9 +52,8 @@ TEST(VerificationCrackTip, WithinTwoSubsetsInEveryFrame) {
     options.columns = 480;
     options.rows = 400;
     VirtualTest test(options);
-    for (const Case& one :
-         {Case{"opening", 0, 2, 0}, Case{"opening wide", 0.1, 8, 0}, Case{"opening little", -0.1, 0.3, 0},
-          Case{"mixed, turned", 2.6, 2, 1}, Case{"from above", 1.57, 2, 0.3}}) {
+    for (const Case& one : {Case{"opening", 0, 2, 0}, Case{"opening wide", 0.1, 8, 0}, Case{"opening little", -0.1, 0.3, 0},
+                            Case{"mixed, turned", 2.6, 2, 1}, Case{"from above", 1.57, 2, 0.3}}) {
         const Vec2 direction(std::cos(one.angle), std::sin(one.angle));
         Vec2 mean = Vec2::Zero();
         int frames = 0;
@@ -64,9 +62,8 @@ TEST(VerificationCrackTip, WithinTwoSubsetsInEveryFrame) {
             const CrackTip tip = test.tip(crack_field(truth, one.angle, one.opening, one.sliding, {0.4, -0.3}));
             ASSERT_EQ(tip.status, TipStatus::ok) << one.what << " " << way;
             const Vec2 error = tip.tip - truth;
-            std::printf("%-15s tip at %4.0f %4.0f: off by %6.2f %6.2f px, said %.2f px, angle off by %.2f deg\n",
-                        one.what, truth.x(), truth.y(), error.x(), error.y(), tip.sigma,
-                        (tip.angle - one.angle) * 57.3);
+            std::printf("%-15s tip at %4.0f %4.0f: off by %6.2f %6.2f px, said %.2f px, angle off by %.2f deg\n", one.what,
+                        truth.x(), truth.y(), error.x(), error.y(), tip.sigma, (tip.angle - one.angle) * 57.3);
             EXPECT_LT(error.norm(), 2 * subset);
             mean += error;
             ++frames;

@@ -26,8 +26,7 @@ constexpr double pi = std::numbers::pi;
 /// FNV-1a (Fowler, Noll and Vo), 64 bit.
 std::uint64_t hash(const std::vector<std::uint8_t>& bytes) {
     std::uint64_t value = 0xcbf29ce484222325u;
-    for (const std::uint8_t byte : bytes)
-        value = (value ^ byte) * 0x100000001b3u;
+    for (const std::uint8_t byte : bytes) value = (value ^ byte) * 0x100000001b3u;
     return value;
 }
 
@@ -56,15 +55,15 @@ EndGrainOptions wavy_block() {
     return options;
 }
 
-template <class Values> double mean(const Values& values) {
+template <class Values>
+double mean(const Values& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 double standard_deviation(const std::vector<double>& values) {
     const double centre = mean(values);
     double sum = 0;
-    for (const double value : values)
-        sum += (value - centre) * (value - centre);
+    for (const double value : values) sum += (value - centre) * (value - centre);
     return std::sqrt(sum / static_cast<double>(values.size() - 1));
 }
 
@@ -218,8 +217,7 @@ TEST(UnitEndGrain, BordersLieWhereLatewoodEndsSharply) {
     const auto degree_at = [&](const Vec2& point) -> std::optional<float> {
         const auto column = static_cast<int>(std::floor(point.x() / options.pixel));
         const auto row = grown.rows - 1 - static_cast<int>(std::floor(point.y() / options.pixel));
-        if (column < 0 || column >= grown.columns || row < 0 || row >= grown.rows)
-            return std::nullopt;
+        if (column < 0 || column >= grown.columns || row < 0 || row >= grown.rows) return std::nullopt;
         return grown.degree[row * grown.columns + column];
     };
     std::size_t checked = 0;
@@ -240,8 +238,7 @@ TEST(UnitEndGrain, BordersLieWhereLatewoodEndsSharply) {
 }
 
 TEST(UnitEndGrain, GrowthPointsAwayFromThePithWhereverItLies) {
-    for (const Vec2& pith :
-         {Vec2(-20e-3, 5e-3), Vec2(30e-3, 5e-3), Vec2(5e-3, -25e-3), Vec2(3e-3, 4e-3), Vec2(2e3, 1e3)}) {
+    for (const Vec2& pith : {Vec2(-20e-3, 5e-3), Vec2(30e-3, 5e-3), Vec2(5e-3, -25e-3), Vec2(3e-3, 4e-3), Vec2(2e3, 1e3)}) {
         EndGrainOptions options;
         options.pixel = 100e-6;
         options.pith = pith;
@@ -274,8 +271,7 @@ TEST(UnitEndGrain, NoSeamWhereTheAngleJumps) {
     };
     double largest_elsewhere = 0;
     for (int row = 100; row < 300; ++row)
-        if (row != 199)
-            largest_elsewhere = std::max(largest_elsewhere, change(row));
+        if (row != 199) largest_elsewhere = std::max(largest_elsewhere, change(row));
     EXPECT_LE(change(199), largest_elsewhere);
 }
 
@@ -287,14 +283,12 @@ TEST(UnitEndGrain, NoiseTextureAndLightAreOfTheSizeAskedFor) {
         change(options);
         const EndGrain with = grow_end_grain(options);
         std::vector<double> difference;
-        for (std::size_t i = channel; i < with.bgr.size(); i += 3)
-            difference.push_back(with.bgr[i] - without.bgr[i]);
+        for (std::size_t i = channel; i < with.bgr.size(); i += 3) difference.push_back(with.bgr[i] - without.bgr[i]);
         return standard_deviation(difference);
     };
     // Rounding to whole grays adds at most 1/6 to a variance of 16, 0.02 to the deviation; 48,000 pixels leave 0.01 of
     // it.
-    for (const int channel : {0, 1, 2})
-        EXPECT_NEAR(deviation_with([](EndGrainOptions& o) { o.noise = 4; }, channel), 4, 0.1);
+    for (const int channel : {0, 1, 2}) EXPECT_NEAR(deviation_with([](EndGrainOptions& o) { o.noise = 4; }, channel), 4, 0.1);
     // Green is 0.99 of gray in EW and 0.88 in LW here; cells are as large as pixels, so a tenth of them is still 5,000.
     EXPECT_NEAR(deviation_with([](EndGrainOptions& o) { o.texture = 4; }, 1), 4, 0.4);
     // Uniform light from 0.9 to 1.1 of a green of 208 or less.

@@ -32,10 +32,10 @@ WoodShot shaken(int seed) {
 
 struct Case {
     const char* what;
-    double angle;    // [rad]
-    double opening;  // at 100 px behind the tip; a fifth of it slides [px]
-    double period;   // of the rings [px]
-    Vec2 pith;       // [px]
+    double angle;        // [rad]
+    double opening;      // at 100 px behind the tip; a fifth of it slides [px]
+    double period;       // of the rings [px]
+    Vec2 pith;           // [px]
     double worst, mean;  // bars: of the distance, and of the mean along the crack [px]
 };
 
@@ -55,8 +55,8 @@ void expect_tips(const std::vector<Case>& cases) {
             ASSERT_EQ(tip.status, TipStatus::ok) << one.what << " " << way;
             const Vec2 error = tip.tip - truth;
             const double along = error.dot(direction);
-            std::printf("%-20s tip at %4.0f %4.0f: off by %5.2f px along, %5.2f px across, said %.2f px\n", one.what, truth.x(), truth.y(), along,
-                        direction.x() * error.y() - direction.y() * error.x(), tip.sigma);
+            std::printf("%-20s tip at %4.0f %4.0f: off by %5.2f px along, %5.2f px across, said %.2f px\n", one.what, truth.x(),
+                        truth.y(), along, direction.x() * error.y() - direction.y() * error.x(), tip.sigma);
             EXPECT_LT(error.norm(), one.worst) << one.what << " " << way;
             sum += along;
             squares += std::pow(along / tip.sigma, 2);
@@ -70,8 +70,8 @@ void expect_tips(const std::vector<Case>& cases) {
 
 }  // namespace
 
-// Bars: a few pixels, unbiased. Where the crack is 0.8 px wide at 100 px behind its tip, the last 15 px are less than 0.3 px wide: there the
-// bar is that.
+// Bars: a few pixels, unbiased. Where the crack is 0.8 px wide at 100 px behind its tip, the last 15 px are less than 0.3 px
+// wide: there the bar is that.
 TEST(VerificationGrayTrack, TipsOfCracksInWood) {
     expect_tips({{"across rings", 0, 3, 60, {-2000, 200}, 5, 2}, {"across, hardly open", 0, 0.8, 60, {-2000, 200}, 15, 5}});
 }
@@ -84,8 +84,9 @@ TEST(SlowGrayTrack, TipsOfMoreCracksInWood) {
                  {"from above", 1.57, 2, 50, {-2000, 200}, 5, 2}});
 }
 
-// A specimen that has come apart: its lower part is held, the upper one has moved by 10 px. The way is where the wood parted, not in the middle
-// of the gap, which lies 5 px above; nor along a ring that the motion darkens. Bar: a few pixels, as for tips; 10 px from the picture's sides.
+// A specimen that has come apart: its lower part is held, the upper one has moved by 10 px. The way is where the wood parted, not
+// in the middle of the gap, which lies 5 px above; nor along a ring that the motion darkens. Bar: a few pixels, as for tips; 10
+// px from the picture's sides.
 TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     const WoodCamera camera(end_grain_picture(columns, rows, 90, {-600, -900}, 3), 10);
     const GrayTracker tracker(camera.take({}), {});
@@ -99,8 +100,7 @@ TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     double worst = 0, sum = 0;
     int count = 0;
     for (const Vec2& point : tip.way) {
-        if (point.x() < 10 || point.x() > columns - 10)
-            continue;
+        if (point.x() < 10 || point.x() > columns - 10) continue;
         const double off = point.y() - crack(point.x());
         worst = std::max(worst, std::abs(off));
         sum += off;
@@ -111,8 +111,8 @@ TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     EXPECT_LT(worst, 5);
 }
 
-// A specimen before a dark ground, black or gray, which shows through the crack: it begins at the specimen's edge, and ends there when both
-// halves have parted over the ground.
+// A specimen before a dark ground, black or gray, which shows through the crack: it begins at the specimen's edge, and ends there
+// when both halves have parted over the ground.
 TEST(VerificationGrayTrack, CrackOfASpecimenOnADarkGround) {
     constexpr int margin = 40;
     const cv::Mat wood = end_grain_picture(columns, rows, 60, {-2000, 200}, 3);
@@ -150,7 +150,8 @@ TEST(VerificationGrayTrack, NoneWhereThereIsNoCrack) {
 }
 
 TEST(VerificationGrayTrack, AnotherPictureIsNotLinedUp) {
-    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10), other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
+    const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10),
+        other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
     EXPECT_NE(GrayTracker(camera.take({}), {}).tip(other.take({})).status, TipStatus::ok);
 }
 
@@ -174,8 +175,7 @@ TEST(VerificationGrayTrack, OpeningOfAnyShapeBeginsWhereItDoes) {
             EXPECT_LT(std::abs(start->place - truth), 3 * start->sigma + 0.5) << power;
         }
     OpeningProfile flat{std::vector<double>(140), std::vector<double>(140), std::vector<double>(140)};
-    for (double& value : flat.opening)
-        value = noise(random);
+    for (double& value : flat.opening) value = noise(random);
     EXPECT_FALSE(find_opening_start(flat));
     EXPECT_FALSE(find_opening_start({{1, 0}, {0, 0}, {0, 0}}));
 }

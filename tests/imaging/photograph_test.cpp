@@ -17,8 +17,7 @@ namespace {
 GrayPicture marked(int columns, int rows, int x, int y) {
     GrayPicture picture{columns, rows, std::vector<std::uint8_t>(static_cast<std::size_t>(columns * rows), 200)};
     for (int j = -5; j < 5; ++j)
-        for (int i = -5; i < 5; ++i)
-            picture.gray[static_cast<std::size_t>((y + j) * columns + x + i)] = 0;
+        for (int i = -5; i < 5; ++i) picture.gray[static_cast<std::size_t>((y + j) * columns + x + i)] = 0;
     return picture;
 }
 
@@ -45,7 +44,8 @@ TEST(UnitPhotograph, LiesWhereItsPlacementSays) {
     for (const double pixel : {20e-6, 5e-6})  // as it is; shrunk, since 1600 pixels are kept of 21 mm
         for (const double rotation : {0.0, 0.3, 1.5707963267948966}) {
             const Vec2 size(20e-3, 15e-3), offset(9e-3, 7e-3);
-            Photograph photograph{.file = folder / "photograph.png", .placement = {pixel, offset, rotation, 0}, .path = {}, .picture = {}};
+            Photograph photograph{
+                .file = folder / "photograph.png", .placement = {pixel, offset, rotation, 0}, .path = {}, .picture = {}};
             const Vec2 mark = Placement{pixel, offset, rotation, 300}.place(249.5, 119.5);
             load_photograph(photograph, size, {"study.toml", "picture"});
             const PlanePicture& picture = photograph.picture;
@@ -74,19 +74,21 @@ TEST(UnitPhotograph, RefusesWhatDoesNotFit) {
     };
     const Placement placement{25e-6, Vec2::Zero(), 0, 0};
     refused({.file = folder / "text.png", .placement = placement, .path = {}, .picture = {}}, "picture");
-    refused({.file = folder / "photograph.png", .placement = placement, .path = {}, .columns = 41, .rows = 30, .picture = {}}, "must have their size");
-    refused({.file = folder / "photograph.png", .placement = {25e-6, {1, 1}, 0, 0}, .path = {}, .picture = {}}, "shows nothing of the specimen");
+    refused({.file = folder / "photograph.png", .placement = placement, .path = {}, .columns = 41, .rows = 30, .picture = {}},
+            "must have their size");
+    refused({.file = folder / "photograph.png", .placement = {25e-6, {1, 1}, 0, 0}, .path = {}, .picture = {}},
+            "shows nothing of the specimen");
     Photograph none;
     load_photograph(none, {1e-3, 1e-3}, {"study.toml", "picture"});
     EXPECT_TRUE(none.picture.gray.empty());
 }
 
-// A spline through samples of a plane is that plane: gray at any place is exact, but for the rounding of float and the picture's ends.
+// A spline through samples of a plane is that plane: gray at any place is exact, but for the rounding of float and the picture's
+// ends.
 TEST(UnitWoodSurface, GrayOfTheWoodAtItsPlace) {
     FinePicture picture{80, 60, {}};
     for (int y = 0; y < 60; ++y)
-        for (int x = 0; x < 80; ++x)
-            picture.gray.push_back(static_cast<float>(10 + 2 * x + y));
+        for (int x = 0; x < 80; ++x) picture.gray.push_back(static_cast<float>(10 + 2 * x + y));
     const Placement placement{25e-6, {1e-3, 2e-3}, 0.4, 60};
     const auto gray = wood_surface(picture, placement, 25e-6), coarse = wood_surface(picture, placement, 50e-6);
     for (const Vec2& px : {Vec2(40, 30), Vec2(30.25, 22.75), Vec2(51.5, 40.1)}) {
@@ -106,7 +108,6 @@ TEST(UnitVirtualCamera, ANarrowGapDarkensAPixelByItsShare) {
     const auto opened = [](const Vec2& px) { return Vec2(0, px.y() > 9.5 ? 0.1 : 0.0); };
     const GrayPicture picture = camera.photograph(opened, 1);
     double missing = 0;
-    for (int y = 0; y < 20; ++y)
-        missing += 200.0 - picture.gray[static_cast<std::size_t>(y * 20 + 10)];
+    for (int y = 0; y < 20; ++y) missing += 200.0 - picture.gray[static_cast<std::size_t>(y * 20 + 10)];
     EXPECT_EQ(missing, 19);
 }

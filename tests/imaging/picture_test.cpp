@@ -34,10 +34,8 @@ Specimen write_and_read(const cv::Mat& pixels, const std::string& name, std::vec
 /// One class a gray: the label shows the gray that a pixel was read as.
 std::vector<GrayClass> classes_around(int gray) {
     std::vector<GrayClass> classes{{"exact", gray, gray}};
-    if (gray > 0)
-        classes.push_back({"darker", 0, gray - 1});
-    if (gray < 255)
-        classes.push_back({"brighter", gray + 1, 255});
+    if (gray > 0) classes.push_back({"darker", 0, gray - 1});
+    if (gray < 255) classes.push_back({"brighter", gray + 1, 255});
     return classes;
 }
 
@@ -109,8 +107,7 @@ TEST(UnitPicture, ColourBecomesGrayWithTheWeightsOfBt601) {
 
 TEST(UnitPicture, TransparencyIsDropped) {
     for (const double alpha : {0.0, 128.0, 255.0})
-        EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_8UC4, cv::Scalar(50, 100, 200, alpha)), "a.png", 124), "exact")
-            << alpha;
+        EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_8UC4, cv::Scalar(50, 100, 200, alpha)), "a.png", 124), "exact") << alpha;
 }
 
 TEST(UnitPicture, SixteenBitIsDividedBy257AndRounded) {
@@ -118,10 +115,8 @@ TEST(UnitPicture, SixteenBitIsDividedBy257AndRounded) {
     for (const auto& [value, gray] :
          {std::pair{0, 0}, {128, 0}, {129, 1}, {32896, 128}, {33024, 128}, {33025, 129}, {65535, 255}})
         for (const char* name : {"a.png", "a.tiff"})
-            EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC1, cv::Scalar(value)), name, gray), "exact")
-                << value << name;
-    EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC3, cv::Scalar(50 * 257, 100 * 257, 200 * 257)), "a.png", 124),
-              "exact");
+            EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC1, cv::Scalar(value)), name, gray), "exact") << value << name;
+    EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC3, cv::Scalar(50 * 257, 100 * 257, 200 * 257)), "a.png", 124), "exact");
     EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC4, cv::Scalar(12850, 25700, 51400, 9)), "a.png", 124), "exact");
 }
 
@@ -164,8 +159,7 @@ TEST(UnitPicture, GraysBetweenRangesAreTransitionWoodWhenGraded) {
     // Linear between the edges 200 and 100; exact in float but for one rounding.
     const std::vector<float> grade{0, 0, 0.25f, 0.5f, 0.99f, 0, 0};
     ASSERT_EQ(specimen.grade.size(), grade.size());
-    for (std::size_t i = 0; i < grade.size(); ++i)
-        EXPECT_FLOAT_EQ(specimen.grade[i], grade[i]) << i;
+    for (std::size_t i = 0; i < grade.size(); ++i) EXPECT_FLOAT_EQ(specimen.grade[i], grade[i]) << i;
 }
 
 TEST(UnitPicture, ThreeGradedClassesGradeToTheirOwnNeighbour) {
@@ -221,12 +215,10 @@ TEST(UnitPicture, LoadSpecimenFillsTheMapFromPictureOrFileAndLeavesOtherScenesAl
 TEST(VerificationPicture, RealEndGrainFallsIntoTwoClasses) {
     // Pine and a Mediterranean core: LW is a clear minority of a ring and never absent; bounds are those of softwoods.
     const std::filesystem::path wood = std::filesystem::path(SHARED_DATA) / "wood";
-    if (!std::filesystem::exists(wood))
-        GTEST_SKIP() << "no shared data at " << wood;
+    if (!std::filesystem::exists(wood)) GTEST_SKIP() << "no shared data at " << wood;
     for (const auto& [name, threshold, columns, rows] :
          {std::tuple{"mtreering_001.png", 110, 2357, 170}, {"urudendro_f02c_crop.png", 185, 600, 600}}) {
-        const Specimen specimen =
-            read_picture(picture_of(wood / name, {{"LW", 0, threshold - 1}, {"EW", threshold, 255}}));
+        const Specimen specimen = read_picture(picture_of(wood / name, {{"LW", 0, threshold - 1}, {"EW", threshold, 255}}));
         EXPECT_EQ(specimen.columns, columns);
         EXPECT_EQ(specimen.rows, rows);
         const auto latewood = std::count(specimen.label.begin(), specimen.label.end(), 1);

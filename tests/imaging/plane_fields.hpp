@@ -16,8 +16,8 @@ struct PlaneField {
 
 /// Displacement `shift` + a polynomial of the distance from `origin` with the coefficients of dx, dy, dx^2, dx dy,
 /// dy^2.
-inline PlaneField polynomial_field(const crampfit::Vec2& origin, const std::array<double, 5>& u,
-                                   const std::array<double, 5>& v, const crampfit::Vec2& shift = {0, 0}) {
+inline PlaneField polynomial_field(const crampfit::Vec2& origin, const std::array<double, 5>& u, const std::array<double, 5>& v,
+                                   const crampfit::Vec2& shift = {0, 0}) {
     using crampfit::Vec2;
     const auto value = [origin](const std::array<double, 5>& c, const Vec2& place) {
         const Vec2 d = place - origin;

@@ -31,7 +31,8 @@ Specimen read_sample() {
 }
 
 /// Length along a row, in all its rings, over which the degree is neither 0 nor 1 [pixels].
-template <class Degree> double transition_pixels(int columns, int row, const Degree& degree) {
+template <class Degree>
+double transition_pixels(int columns, int row, const Degree& degree) {
     double length = 0;
     for (int column = 0; column < columns; ++column) {
         const double value = degree(row * columns + column);
@@ -68,16 +69,14 @@ TEST(UnitSample, ReadBackAsTheWoodThatWasDrawn) {
     }
     const double count = static_cast<double>(grown.degree.size());
     EXPECT_LT(static_cast<double>(wrong) / count, 0.02);
-    EXPECT_NEAR(error / count, 0, 0.01);  // rays, texture and the cut ends of the gray scale, on the mean
+    EXPECT_NEAR(error / count, 0, 0.01);                          // rays, texture and the cut ends of the gray scale, on the mean
     EXPECT_NEAR(latewood / count, 0.25 + 0.3 / (2 * 2.2), 0.04);  // five rings whose fractions vary by 0.025
 }
 
 TEST(UnitSample, TransitionIsWideOnTheEarlywoodSideAndSharpOnTheOther) {
     const EndGrain grown = drawn();
     const Specimen specimen = read_sample();
-    const auto degree = [&](int i) {
-        return static_cast<double>(specimen.label[i]) + static_cast<double>(specimen.grade[i]);
-    };
+    const auto degree = [&](int i) { return static_cast<double>(specimen.label[i]) + static_cast<double>(specimen.grade[i]); };
     double length = 0, rings = 0, sharp = 0;
     for (int row = 0; row < specimen.rows; ++row) {
         length += transition_pixels(specimen.columns, row, degree);

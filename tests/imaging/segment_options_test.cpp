@@ -56,8 +56,8 @@ TEST(VerificationSegment, BlocksOnBlackAndOnWhite) {
             worst = std::max(worst, std::abs(specimen.rings[i].width / alone.rings[i].width - 1));
         const auto voids = std::count(specimen.label.begin(), specimen.label.end(), Specimen::void_label);
         const double ground = static_cast<double>(shown.total() - pixels.total());
-        std::printf("%g degrees on gray %d: widths within %.2f %% of the block's alone, void %.2f %% of the ground\n", degrees, gray, 100 * worst,
-                    100 * static_cast<double>(voids) / ground);
+        std::printf("%g degrees on gray %d: widths within %.2f %% of the block's alone, void %.2f %% of the ground\n", degrees,
+                    gray, 100 * worst, 100 * static_cast<double>(voids) / ground);
         EXPECT_LT(worst, 0.01);
         EXPECT_NEAR(static_cast<double>(voids) / ground, 1, 0.05);  // its rim is taken with it
     }
@@ -89,20 +89,20 @@ TEST(UnitSegment, DirectionFromASecondPicture) {
     cv::Mat stripes(pixels.size(), CV_8U);
     for (int y = 0; y < stripes.rows; ++y)
         for (int x = 0; x < stripes.cols; ++x)
-            stripes.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(128 + 80 * std::sin(0.3 * (x - y)));  // brightest along 45 degrees
+            // Brightest along 45 degrees.
+            stripes.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(128 + 80 * std::sin(0.3 * (x - y)));
     const TemporaryFolder folder;
     ASSERT_TRUE(cv::imwrite((folder / "a.png").string(), pixels) && cv::imwrite((folder / "b.png").string(), stripes) &&
                 cv::imwrite((folder / "c.png").string(), stripes.rowRange(0, 100)));
     const Specimen own = segment(folder / "a.png", {}).specimen;
     const Specimen other = segment(folder / "a.png", {.direction = folder / "b.png"}).specimen;
     EXPECT_EQ(other.label, own.label);
-    for (const float angle : other.orientation)
-        ASSERT_NEAR(angle, 0.25 * CV_PI, 0.02);  // x - y grows to the right and up
+    for (const float angle : other.orientation) ASSERT_NEAR(angle, 0.25 * CV_PI, 0.02);  // x - y grows to the right and up
     EXPECT_THROW(segment(folder / "a.png", {.direction = folder / "c.png"}), InputError);
 }
 
-// Rings about a known pith outside the picture and in it, under noise of 5 %, a wide crack and a knot of noise across them; and straight ones. Bar of
-// the directions: mean error 1 degree.
+// Rings about a known pith outside the picture and in it, under noise of 5 %, a wide crack and a knot of noise across them; and
+// straight ones. Bar of the directions: mean error 1 degree.
 TEST(VerificationSegment, DirectionsFromAFittedPith) {
     for (const Vec2& pith : {Vec2(-250, 420), Vec2(200, 130), Vec2(-1e6, 150)}) {
         cv::Mat pixels(300, 400, CV_32F), grain(pixels.size(), CV_32F);
@@ -119,8 +119,7 @@ TEST(VerificationSegment, DirectionsFromAFittedPith) {
         const auto error_of = [&](const SegmentOptions& options) {
             const Segmentation result = segment_pixels(pixels, options);
             for (const std::string& note : result.notes)
-                if (note.starts_with("pith"))
-                    std::printf("%s\n", note.c_str());
+                if (note.starts_with("pith")) std::printf("%s\n", note.c_str());
             double sum = 0;
             for (int y = 0; y < pixels.rows; ++y)
                 for (int x = 0; x < pixels.cols; ++x) {
@@ -131,10 +130,12 @@ TEST(VerificationSegment, DirectionsFromAFittedPith) {
             return sum / static_cast<double>(pixels.total());
         };
         const double own = error_of({}), fitted = error_of({.fit_pith = true});
-        std::printf("pith at %g,%g px: directions off by %.2f degrees on average, of the fitted pith by %.2f\n", pith.x(), pith.y(), own, fitted);
+        std::printf("pith at %g,%g px: directions off by %.2f degrees on average, of the fitted pith by %.2f\n", pith.x(),
+                    pith.y(), own, fitted);
         EXPECT_LT(fitted, 1);
         EXPECT_LT(fitted, own);
-        EXPECT_LT(error_of({.pith = pith}), 0.05);  // between nodes a direction is off by about the square of their spacing over the pith's distance
+        EXPECT_LT(error_of({.pith = pith}),
+                  0.05);  // between nodes a direction is off by about the square of their spacing over the pith's distance
     }
 }
 
@@ -142,7 +143,8 @@ TEST(VerificationSegment, DirectionsFromAFittedPith) {
 TEST(UnitSegment, DensityByATable) {
     const EndGrain grown = grow_end_grain({});
     const TemporaryFolder folder;
-    ASSERT_TRUE(cv::imwrite((folder / "a.png").string(), cv::Mat(grown.rows, grown.columns, CV_8U, const_cast<std::uint8_t*>(grown.gray.data()))));
+    ASSERT_TRUE(cv::imwrite((folder / "a.png").string(),
+                            cv::Mat(grown.rows, grown.columns, CV_8U, const_cast<std::uint8_t*>(grown.gray.data()))));
     SegmentOptions options;
     options.pixel = grown.truth.pixel;
     options.density = DensityTable{{50, 210}, {1000, 200}};  // brighter is lighter, as in a print of an X-ray picture
@@ -185,8 +187,10 @@ TEST(UnitSegment, ResinCanalsAreKeptApart) {
     const Specimen specimen = segment_pixels(pixels).specimen;
     std::size_t found = 0;
     for (const cv::Point& canal : canals)
-        found += specimen.feature[static_cast<std::size_t>(canal.y * grown.columns + canal.x)] == static_cast<int>(Feature::resin_canal);
-    const auto marked = std::count(specimen.feature.begin(), specimen.feature.end(), static_cast<std::uint8_t>(Feature::resin_canal));
+        found += specimen.feature[static_cast<std::size_t>(canal.y * grown.columns + canal.x)] ==
+                 static_cast<int>(Feature::resin_canal);
+    const auto marked =
+        std::count(specimen.feature.begin(), specimen.feature.end(), static_cast<std::uint8_t>(Feature::resin_canal));
     std::printf("%zu of %zu canals found, %ld pixels marked\n", found, canals.size(), static_cast<long>(marked));
     EXPECT_GE(found, canals.size() - 1);
     EXPECT_LT(marked, static_cast<long>(60 * canals.size()));

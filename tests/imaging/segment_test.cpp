@@ -1,8 +1,8 @@
 // Pictures to specimens, against end grain whose truth is known, and against real pictures where they are at hand.
-#include "imaging/segment.hpp"
 #include "imaging/end_grain.hpp"
 #include "imaging/picture.hpp"
 #include "imaging/preview.hpp"
+#include "imaging/segment.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include "datasets/error.hpp"
@@ -52,8 +52,7 @@ double distance_along(const BorderPolyline& border, double x, double y, bool gro
         const Eigen::Vector2d &a = border.points[i - 1], &b = border.points[i];
         const int along = growth_along_x ? 1 : 0;
         const double at = growth_along_x ? y : x;
-        if ((a[along] - at) * (b[along] - at) > 0)
-            continue;
+        if ((a[along] - at) * (b[along] - at) > 0) continue;
         const double share = b[along] == a[along] ? 0 : (at - a[along]) / (b[along] - a[along]);
         const Eigen::Vector2d place = a + share * (b - a);
         return growth_along_x ? place.x() - x : place.y() - y;
@@ -77,33 +76,30 @@ bool crosses(const RingBorder& border, const EndGrain& grown) {
 bool near_a_border(const Eigen::Vector2d& vertex, const EndGrain& grown) {
     const Vec2 place(vertex.x() + 0.5, grown.rows - 0.5 - vertex.y());  // [pixels]
     return std::ranges::any_of(grown.borders, [&](const RingBorder& border) {
-        return std::ranges::any_of(border.points, [&](const Vec2& point) { return (point / grown.truth.pixel - place).norm() < 3; });
+        return std::ranges::any_of(border.points,
+                                   [&](const Vec2& point) { return (point / grown.truth.pixel - place).norm() < 3; });
     });
 }
 
-/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a border may end
-/// up to 6 pixels before.
+/// Every true vertex at least 3 pixels within the picture against the found border nearest to it. Where it leaves the picture a
+/// border may end up to 6 pixels before.
 Misses compare_borders(const EndGrain& grown, const Specimen& specimen) {
     Misses misses;
     for (const RingBorder& border : grown.borders) {
-        if (!crosses(border, grown))
-            continue;
+        if (!crosses(border, grown)) continue;
         for (const Vec2& point : border.points) {
             const double x = point.x() / grown.truth.pixel - 0.5, y = grown.rows - point.y() / grown.truth.pixel - 0.5;
-            if (x < 3 || x > grown.columns - 4 || y < 3 || y > grown.rows - 4)
-                continue;
+            if (x < 3 || x > grown.columns - 4 || y < 3 || y > grown.rows - 4) continue;
             double nearest = std::numeric_limits<double>::infinity();
             for (const BorderPolyline& found : specimen.borders)
-                if (const double d = std::abs(distance_along(found, x, y, true)); d < nearest)
-                    nearest = d;
-            if (nearest < 10)
-                misses.distance.push_back(nearest);
-            else if (x >= 6 && x <= grown.columns - 7 && y >= 6 && y <= grown.rows - 7)
-                ++misses.lost;
+                if (const double d = std::abs(distance_along(found, x, y, true)); d < nearest) nearest = d;
+            if (nearest < 10) misses.distance.push_back(nearest);
+            else if (x >= 6 && x <= grown.columns - 7 && y >= 6 && y <= grown.rows - 7) ++misses.lost;
         }
     }
     for (const BorderPolyline& found : specimen.borders)
-        misses.invented += std::ranges::count_if(found.points, [&](const Eigen::Vector2d& vertex) { return !near_a_border(vertex, grown); });
+        misses.invented +=
+            std::ranges::count_if(found.points, [&](const Eigen::Vector2d& vertex) { return !near_a_border(vertex, grown); });
     std::sort(misses.distance.begin(), misses.distance.end());
     return misses;
 }
@@ -138,8 +134,7 @@ std::vector<double> orientation_errors(const Specimen& specimen, cv::Point2d pit
 
 double mean(const std::vector<double>& values) {
     double sum = 0;
-    for (const double value : values)
-        sum += value;
+    for (const double value : values) sum += value;
     return sum / static_cast<double>(values.size());
 }
 
@@ -173,8 +168,7 @@ TEST(VerificationSegment, EndGrainWithNoiseAndWaviness) {
         const long crossing = std::count_if(grown.borders.begin(), grown.borders.end(),
                                             [&](const RingBorder& border) { return crosses(border, grown); });
         std::size_t right = 0;
-        for (std::size_t i = 0; i < specimen.label.size(); ++i)
-            right += specimen.label[i] == (grown.degree[i] >= 0.5f ? 1 : 0);
+        for (std::size_t i = 0; i < specimen.label.size(); ++i) right += specimen.label[i] == (grown.degree[i] >= 0.5f ? 1 : 0);
         const double share = static_cast<double>(right) / static_cast<double>(specimen.label.size());
         // A ring's LW by the generator begins where the degree is 1; half way through the transition it is 1/2.
         // A ring that is only seen in part, at the picture's edge, may have no truth of its width.
@@ -185,18 +179,18 @@ TEST(VerificationSegment, EndGrainWithNoiseAndWaviness) {
             for (const GrowthRing& truth : grown.rings) {
                 const double width = truth.outer_radius - truth.inner_radius;
                 if (std::abs(width / grown.truth.pixel - ring.width) < 2)
-                    nearest = std::min(nearest, std::abs(truth.latewood_fraction + 0.5 * truth.transition / width - ring.latewood_fraction));
+                    nearest = std::min(
+                        nearest, std::abs(truth.latewood_fraction + 0.5 * truth.transition / width - ring.latewood_fraction));
             }
-            if (nearest == 1)
-                continue;
+            if (nearest == 1) continue;
             ++compared;
             worst_fraction = std::max(worst_fraction, nearest);
         }
         EXPECT_GE(compared, crossing - 1);
         std::printf("seed %d: %zu borders of %zu; border misses mean %.2f, 99 %% within %.2f, worst %.2f px, %d lost; classes "
-                    "%.2f %% right; LW fraction worst %.2f %%\n", static_cast<int>(seed), specimen.borders.size(), static_cast<std::size_t>(crossing),
-                    mean(misses.distance), at_share(misses.distance, 0.99), misses.distance.back(), misses.lost, 100 * share,
-                    100 * worst_fraction);
+                    "%.2f %% right; LW fraction worst %.2f %%\n",
+                    static_cast<int>(seed), specimen.borders.size(), static_cast<std::size_t>(crossing), mean(misses.distance),
+                    at_share(misses.distance, 0.99), misses.distance.back(), misses.lost, 100 * share, 100 * worst_fraction);
         EXPECT_GE(static_cast<long>(specimen.borders.size()), crossing);  // others cut a corner
         EXPECT_EQ(misses.lost, 0);
         EXPECT_EQ(misses.invented, 0);
@@ -220,7 +214,8 @@ TEST(VerificationSegment, OrientationOfRings) {
     for (const auto& [name, size, pith, period] : cases) {
         const Specimen specimen = segment_pixels(rings(size, pith, period, 0.05)).specimen;
         const std::vector<double> errors = orientation_errors(specimen, pith);
-        std::printf("%s: mean %.3f, 95 %% within %.3f, worst %.2f deg\n", name, mean(errors), at_share(errors, 0.95), errors.back());
+        std::printf("%s: mean %.3f, 95 %% within %.3f, worst %.2f deg\n", name, mean(errors), at_share(errors, 0.95),
+                    errors.back());
         EXPECT_LT(mean(errors), 1.0) << name;
         EXPECT_LT(at_share(errors, 0.95), 3.0) << name;
     }
@@ -230,9 +225,8 @@ TEST(VerificationSegment, TheSameRingsHoweverThePictureIsTurned) {
     const cv::Mat pixels = picture_of(grow_end_grain(noisy_block(4)));
     const Specimen upright = segment_pixels(pixels, {.growth = GrowthAxis::right}).specimen;
     ASSERT_GE(upright.rings.size(), 2u);
-    const std::pair<int, const char*> turns[] = {{cv::ROTATE_90_COUNTERCLOCKWISE, "growth +y"},
-                                                 {cv::ROTATE_180, "growth -x"},
-                                                 {cv::ROTATE_90_CLOCKWISE, "growth -y"}};
+    const std::pair<int, const char*> turns[] = {
+        {cv::ROTATE_90_COUNTERCLOCKWISE, "growth +y"}, {cv::ROTATE_180, "growth -x"}, {cv::ROTATE_90_CLOCKWISE, "growth -y"}};
     for (const auto& [turn, growth] : turns) {
         cv::Mat turned;
         cv::rotate(pixels, turned, turn);
@@ -260,16 +254,17 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
     }
 }
 
-// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; the direction of wavy ones is
-// known: r + a sin(k theta r0) is constant along a ring. The others run askew and wave by 6 and 15 degrees, under noise of 5 %. Bars
-// of the borders and of the orientation as above.
+// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; the
+// direction of wavy ones is known: r + a sin(k theta r0) is constant along a ring. The others run askew and wave by 6 and 15
+// degrees, under noise of 5 %. Bars of the borders and of the orientation as above.
 TEST(VerificationSegment, WavyRings) {
     const struct {
         const char* name;
         cv::Point2d pith;
         double a, wave;      // amplitude, length of the waves [px]
         double dark, noise;  // of LW, standard deviation [grays]
-    } cases[] = {{"drawn", {-1200, 180}, 2, 140, 0, 0}, {"askew", {-600, 1000}, 2, 120, 70, 0.05 * 255},
+    } cases[] = {{"drawn", {-1200, 180}, 2, 140, 0, 0},
+                 {"askew", {-600, 1000}, 2, 120, 70, 0.05 * 255},
                  {"steep waves askew", {-600, 1000}, 6, 140, 70, 0.05 * 255}};
     const cv::Size size(500, 400);
     constexpr double period = 50;
@@ -295,7 +290,7 @@ TEST(VerificationSegment, WavyRings) {
         for (int x = 4; x < size.width - 3; ++x)
             crossing += std::floor(radius(x, 200) / period) > std::floor(radius(x - 1, 200) / period);
         EXPECT_GE(specimen.borders.size(), crossing) << name;  // others cut a corner
-        std::vector<double> misses;  // [px]
+        std::vector<double> misses;                            // [px]
         for (const BorderPolyline& border : specimen.borders)
             for (const Eigen::Vector2d& point : border.points)
                 misses.push_back(std::abs(std::remainder(radius(point.x(), point.y()), period)));
@@ -308,17 +303,17 @@ TEST(VerificationSegment, WavyRings) {
                 errors.push_back(std::abs(std::remainder(found - std::atan2(-dy, dx), pi)) * 180 / pi);
             }
         std::sort(errors.begin(), errors.end());
-        std::printf("%s: borders 99 %% within %.2f, worst %.2f px; direction mean %.2f, 95 %% within %.2f deg\n", name, at_share(misses, 0.99),
-                    misses.back(), mean(errors), at_share(errors, 0.95));
+        std::printf("%s: borders 99 %% within %.2f, worst %.2f px; direction mean %.2f, 95 %% within %.2f deg\n", name,
+                    at_share(misses, 0.99), misses.back(), mean(errors), at_share(errors, 0.95));
         EXPECT_LT(at_share(misses, 0.99), 1) << name;
         EXPECT_LT(mean(errors), 1) << name;
         EXPECT_LT(at_share(errors, 0.95), 3) << name;
     }
 }
 
-// Rings whose EW darkens from its very beginning and whose LW does to its very end, blurred, waving, under noise of 5 % and uneven light. LW is what
-// lies beyond half of a ring's range (the half-range rule) in the wood, not in its blurred picture. Bars of the LW fraction and of the classes
-// as above.
+// Rings whose EW darkens from its very beginning and whose LW does to its very end, blurred, waving, under noise of 5 % and
+// uneven light. LW is what lies beyond half of a ring's range (the half-range rule) in the wood, not in its blurred picture. Bars
+// of the LW fraction and of the classes as above.
 TEST(VerificationSegment, RingsWithoutAPlateau) {
     const struct {
         const char* name;
@@ -339,8 +334,7 @@ TEST(VerificationSegment, RingsWithoutAPlateau) {
         for (int y = 0; y < size.height; ++y)
             for (int x = 0; x < size.width; ++x) {
                 double sum = 0;
-                for (int i = 0; i < 25; ++i)
-                    sum += degree(place(x + (i % 5 - 2) / 5.0, y + (i / 5 - 2) / 5.0)) / 25;
+                for (int i = 0; i < 25; ++i) sum += degree(place(x + (i % 5 - 2) / 5.0, y + (i / 5 - 2) / 5.0)) / 25;
                 pixels.at<float>(y, x) = static_cast<float>((190 - 110 * sum) * (0.9 + 0.2 * x / size.width));
             }
         cv::GaussianBlur(pixels, pixels, {}, 0.7);
@@ -370,8 +364,7 @@ TEST(VerificationSegment, RingsWithoutAPlateau) {
 TEST(VerificationSegment, IncrementCore) {
     const auto image = wood / "mtreering_001.png";
     std::ifstream table(wood / "mtreering_001_ring_borders.csv");
-    if (!table)
-        GTEST_SKIP() << "there is no " << image;
+    if (!table) GTEST_SKIP() << "there is no " << image;
     std::vector<double> truth;
     std::string line;
     for (std::getline(table, line); std::getline(table, line);) {
@@ -386,8 +379,7 @@ TEST(VerificationSegment, IncrementCore) {
     std::vector<double> found, errors, width_errors;
     for (const BorderPolyline& border : specimen.borders) {
         double sum = 0;
-        for (const Eigen::Vector2d& point : border.points)
-            sum += point.x();
+        for (const Eigen::Vector2d& point : border.points) sum += point.x();
         found.push_back(sum / static_cast<double>(border.points.size()));
         EXPECT_LT(border.points.front().y(), 1);  // over the whole height
         EXPECT_GT(border.points.back().y(), specimen.rows - 2);
@@ -395,8 +387,7 @@ TEST(VerificationSegment, IncrementCore) {
     std::sort(found.begin(), found.end());
     for (std::size_t i = 0; i < truth.size(); ++i) {
         errors.push_back(std::abs(found[i] - truth[i]));
-        if (i > 0)
-            width_errors.push_back(std::abs((found[i] - found[i - 1]) / (truth[i] - truth[i - 1]) - 1));
+        if (i > 0) width_errors.push_back(std::abs((found[i] - found[i - 1]) / (truth[i] - truth[i - 1]) - 1));
     }
     std::sort(errors.begin(), errors.end());
     std::sort(width_errors.begin(), width_errors.end());
@@ -411,13 +402,13 @@ TEST(VerificationSegment, IncrementCore) {
 // Counted by eye along x = 450 px: thirteen borders from the bark to the lower edge.
 TEST(VerificationSegment, DiskWithCracksAndWriting) {
     const auto image = wood / "urudendro_f02c_crop.png";
-    if (!std::filesystem::exists(image))
-        GTEST_SKIP() << "there is no " << image;
+    if (!std::filesystem::exists(image)) GTEST_SKIP() << "there is no " << image;
     const Specimen specimen = segment(image, {.pixel = 85e-6}).specimen;
     EXPECT_EQ(specimen.borders.size(), 13u);
     for (const BorderPolyline& border : specimen.borders) {
         const double length = border.points.back().x() - border.points.front().x();
-        std::printf("ring %d: x from %.0f to %.0f\n", static_cast<int>(border.ring), border.points.front().x(), border.points.back().x());
+        std::printf("ring %d: x from %.0f to %.0f\n", static_cast<int>(border.ring), border.points.front().x(),
+                    border.points.back().x());
         EXPECT_GT(length, 0.75 * specimen.columns);
     }
 }
@@ -486,7 +477,8 @@ TEST(UnitSegment, ScaleByTheFilesTag) {
     const TemporaryFolder folder;
     const cv::Mat pixels = picture_of(grow_end_grain({}));
     const auto file = folder / "a.tiff";
-    ASSERT_TRUE(cv::imwrite(file.string(), pixels, {cv::IMWRITE_TIFF_XDPI, 1200, cv::IMWRITE_TIFF_YDPI, 1200, cv::IMWRITE_TIFF_RESUNIT, 2}));
+    ASSERT_TRUE(cv::imwrite(file.string(), pixels,
+                            {cv::IMWRITE_TIFF_XDPI, 1200, cv::IMWRITE_TIFF_YDPI, 1200, cv::IMWRITE_TIFF_RESUNIT, 2}));
     const Segmentation tagged = segment(file, {});
     EXPECT_NEAR(tagged.specimen.pixel, 0.0254 / 1200, 1e-12);
     EXPECT_NE(tagged.notes.front().find("resolution tag"), std::string::npos);
@@ -505,7 +497,8 @@ TEST(UnitSegment, BadPicturesAreNamed) {
     EXPECT_NE(refusal(folder.write("text.png", "no picture")).find("no picture"), std::string::npos);
     EXPECT_NE(refusal(saved("one.png", cv::Mat(1, 1, CV_8U, cv::Scalar(9)))).find("1 x 1 pixels"), std::string::npos);
     EXPECT_NE(refusal(saved("black.png", cv::Mat::zeros(100, 100, CV_8U))).find("black"), std::string::npos);
-    EXPECT_NE(refusal(saved("white.png", cv::Mat(100, 100, CV_8UC3, cv::Scalar(255, 255, 255)))).find("equally bright"), std::string::npos);
+    EXPECT_NE(refusal(saved("white.png", cv::Mat(100, 100, CV_8UC3, cv::Scalar(255, 255, 255)))).find("equally bright"),
+              std::string::npos);
     EXPECT_NE(refusal(saved("float.tiff", cv::Mat(100, 100, CV_32F, cv::Scalar(0.5)))).find("8 or 16 bits"), std::string::npos);
     EXPECT_NE(refusal(saved("large.png", cv::Mat::zeros(8200, 8200, CV_8U))).find("2^26"), std::string::npos);
 }
@@ -518,10 +511,8 @@ TEST(UnitSegment, PicturesWithoutRingsGiveNoneAndDoNotFail) {
     for (const cv::Mat& pixels : {noise, step, dot}) {
         const Specimen specimen = segment_pixels(pixels).specimen;
         EXPECT_TRUE(specimen.rings.empty()) << pixels.size();
-        for (const float angle : specimen.orientation)
-            ASSERT_TRUE(angle >= 0 && angle <= pi + 1e-6);
-        for (const std::uint8_t label : specimen.label)
-            ASSERT_TRUE(label < 2 || label == Specimen::void_label);
+        for (const float angle : specimen.orientation) ASSERT_TRUE(angle >= 0 && angle <= pi + 1e-6);
+        for (const std::uint8_t label : specimen.label) ASSERT_TRUE(label < 2 || label == Specimen::void_label);
     }
 }
 

@@ -10,10 +10,12 @@
 
 /// How a picture of wood is taken.
 struct WoodShot {
-    crampfit::PlaneDisplacement displacement = [](const crampfit::Vec2&) { return crampfit::Vec2(0, 0); };  // of the reference's places [px]
-    cv::Matx23d camera{1, 0, 0, 0, 1, 0};  // where it sees the displaced places [px]
-    double gain = 1, tilt = 0, offset = 0; // light: gray * (gain + tilt * (x from -1 to 1)) + offset
-    double noise = 2;                      // standard deviation of each pixel [gray]
+    crampfit::PlaneDisplacement displacement = [](const crampfit::Vec2&) {
+        return crampfit::Vec2(0, 0);
+    };                                      // of the reference's places [px]
+    cv::Matx23d camera{1, 0, 0, 0, 1, 0};   // where it sees the displaced places [px]
+    double gain = 1, tilt = 0, offset = 0;  // light: gray * (gain + tilt * (x from -1 to 1)) + offset
+    double noise = 2;                       // standard deviation of each pixel [gray]
     int seed = 1;
 };
 
@@ -35,8 +37,7 @@ class WoodCamera {
         cv::remap(wood_, seen, places, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REFLECT_101);
         for (int y = 0; y < places.rows; ++y)
             for (int x = 0; x < places.cols; ++x)
-                if (std::isnan(places.at<cv::Vec2f>(y, x)[0]))
-                    seen.at<float>(y, x) = static_cast<float>(gap_);
+                if (std::isnan(places.at<cv::Vec2f>(y, x)[0])) seen.at<float>(y, x) = static_cast<float>(gap_);
         cv::resize(seen, picture, wood_.size(), 0, 0, cv::INTER_AREA);
         cv::GaussianBlur(picture, picture, {}, 0.7);  // the lens
         cv::Mat noise(picture.size(), CV_32F);
@@ -57,8 +58,7 @@ class WoodCamera {
         crampfit::Vec2 place = seen;
         for (int i = 0; i < 50; ++i) {
             const crampfit::Vec2 next = seen - displacement(place);
-            if ((next - place).norm() < 1e-6)
-                return {static_cast<float>(next.x()), static_cast<float>(next.y())};
+            if ((next - place).norm() < 1e-6) return {static_cast<float>(next.x()), static_cast<float>(next.y())};
             place = next;
         }
         return {NAN, NAN};

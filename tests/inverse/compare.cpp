@@ -19,7 +19,8 @@ const char* const names[] = {"normal to opening", "hoop stress", "energy release
 Record turned_wedge(const Scene& scene, double spread) {
     FakeWedge wedge;
     wedge.sharpness = 1;
-    const auto number = std::find(std::begin(directions), std::end(directions), scene.cracks[0].direction) - std::begin(directions);
+    const auto number =
+        std::find(std::begin(directions), std::end(directions), scene.cracks[0].direction) - std::begin(directions);
     wedge.ring *= 1 + spread * static_cast<double>(number);
     return wedge(scene);
 }
@@ -52,8 +53,8 @@ TEST(VerificationCompare, RanksTheHiddenCriterionFirst) {
         const Fit fit = fit_models(study, options);
         ASSERT_EQ(fit.models.size(), 4u);
         first += fit.models[0].name == names[truth] ? 1 : 0;
-        std::printf("truth %s: %s with weight %.3f, then %s with %.3f\n", names[truth], fit.models[0].name.c_str(), fit.models[0].weight,
-                    fit.models[1].name.c_str(), fit.models[1].weight);
+        std::printf("truth %s: %s with weight %.3f, then %s with %.3f\n", names[truth], fit.models[0].name.c_str(),
+                    fit.models[0].weight, fit.models[1].name.c_str(), fit.models[1].weight);
     }
     EXPECT_GE(first, 9);
 }
@@ -102,8 +103,8 @@ TEST(VerificationLoss, OutliersHardlyMoveARobustFit) {
         study.optimizer.loss = loss;
         const Fit fit = fit_study(study, with(wedge, 2));
         off[static_cast<int>(loss)] = std::abs(fit.parameters[0].value / true_earlywood - 1);
-        std::printf("loss %d: earlywood off by %.3f %%, standard error %.3f %%\n", static_cast<int>(loss), 100 * off[static_cast<int>(loss)],
-                    100 * fit.parameters[0].standard_error / true_earlywood);
+        std::printf("loss %d: earlywood off by %.3f %%, standard error %.3f %%\n", static_cast<int>(loss),
+                    100 * off[static_cast<int>(loss)], 100 * fit.parameters[0].standard_error / true_earlywood);
     }
     EXPECT_GT(off[0], 0.1);
     EXPECT_LT(off[1], 0.01);

@@ -18,8 +18,8 @@ TEST(UnitCrackPaths, DistanceOfParallelLines) {
     EXPECT_NEAR(path.compared_length, 2, 0.01);  // to a place in 1000
 }
 
-// A kink of 45 degrees at the notch's tip: at s along the straight path the distance is s / sqrt 2, up to the foot of the simulated tip,
-// s = 2 for a kinked length of sqrt 2.
+// A kink of 45 degrees at the notch's tip: at s along the straight path the distance is s / sqrt 2, up to the foot of the
+// simulated tip, s = 2 for a kinked length of sqrt 2.
 TEST(UnitCrackPaths, DistanceFromAKinkedPath) {
     SimulatedPath path{.model = "", .status = "", .cracks = {{{0, 0}, {1, 0}, {2, 1}}}};
     compare_paths({{1, 0}, {9, 0}}, notch, path);

@@ -40,8 +40,8 @@ TEST(VerificationPosterior, EnsembleHasTheMomentsOfANormalDistribution) {
     const Normal normal;
     Objective objective = normal.objective(100000);
     // It begins far too narrow and off the middle: the burn-in must see to that.
-    const Ensemble ensemble = draw_ensemble(objective, half_misfit, Eigen::Vector2d(0.45, 0.42),
-                                            Eigen::Matrix2d::Identity() * 1e-6, 20000, 5);
+    const Ensemble ensemble =
+        draw_ensemble(objective, half_misfit, Eigen::Vector2d(0.45, 0.42), Eigen::Matrix2d::Identity() * 1e-6, 20000, 5);
     ASSERT_EQ(ensemble.samples.size(), 20000u);
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for (const crampfit::Run& sample : ensemble.samples) {
@@ -52,7 +52,8 @@ TEST(VerificationPosterior, EnsembleHasTheMomentsOfANormalDistribution) {
         covariance += (sample.x - mean) * (sample.x - mean).transpose() / 20000;
     }
     const double independent = 20000 / ensemble.correlation_time.maxCoeff();
-    std::printf("posterior: mean %.4f %.4f (exact 0.5 0.4), sd %.4f %.4f (0.05 0.02), correlation %.3f (0.9), %.0f independent, %.0f %% moved\n",
+    std::printf("posterior: mean %.4f %.4f (exact 0.5 0.4), sd %.4f %.4f (0.05 0.02), correlation %.3f (0.9), %.0f independent, "
+                "%.0f %% moved\n",
                 mean[0], mean[1], std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1)),
                 covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1)), independent, 100 * ensemble.acceptance);
     EXPECT_GT(independent, 200);
@@ -69,8 +70,7 @@ TEST(VerificationPosterior, KeepsToTheCubeAndCutsADistributionOffThere) {
     normal.mean = {0.0, 0.5};
     normal.covariance = Eigen::Vector2d(0.01, 0.01).asDiagonal();  // sd 0.1
     Objective objective = normal.objective(100000);
-    const Ensemble ensemble =
-        draw_ensemble(objective, half_misfit, Eigen::Vector2d(0.1, 0.5), normal.covariance, 20000, 5);
+    const Ensemble ensemble = draw_ensemble(objective, half_misfit, Eigen::Vector2d(0.1, 0.5), normal.covariance, 20000, 5);
     double mean = 0;
     for (const crampfit::Run& sample : ensemble.samples) {
         EXPECT_GE(sample.x.minCoeff(), 0);
@@ -188,7 +188,8 @@ TEST(SystemExplore, AProfileThatNeverRisesIsTheWholeBox) {
         return record;
     };
     Study study = wedge_study(FakeWedge{});
-    study.experiments[0].scene.materials["LW"].toughness = 80;  // with EW 100 their product is that of opposite corners of the box
+    // With EW 100 their product is that of opposite corners of the box.
+    study.experiments[0].scene.materials["LW"].toughness = 80;
     study.experiments[0].data = measure(product(study.experiments[0].scene, nullptr), 0.05, 0, 2);
     study.experiments[0].data.crack_length.clear();
     study.experiments[0].noise.force = 0.05;
@@ -229,7 +230,8 @@ TEST(VerificationLackOfFit, IsSeenWhereItIsAndSeldomWhereItIsNot) {
         large += lack_of_fit(check_fit(residuals(100, 1.6, 0, seed), 0)).find("chi-square") != std::string::npos ? 1 : 0;
         correlated += lack_of_fit(check_fit(residuals(100, 0.5, 0.7, seed), 0)).find("go together") != std::string::npos ? 1 : 0;
     }
-    std::printf("lack of fit of 500: %d where there is none, %d of 1.6 sigma, %d of correlation 0.7\n", alarms, large, correlated);
+    std::printf("lack of fit of 500: %d where there is none, %d of 1.6 sigma, %d of correlation 0.7\n", alarms, large,
+                correlated);
     EXPECT_LE(alarms, 14);  // of 500 at 1 %, more happen once in two thousand times (binomial)
     EXPECT_GE(large, 480);
     EXPECT_GE(correlated, 480);

@@ -12,7 +12,7 @@
 namespace crampfit::testing {
 namespace {
 
-constexpr double pixel = 20e-6;  // [m]
+constexpr double pixel = 20e-6;                                  // [m]
 constexpr double true_earlywood = 60e6, true_latewood = 1000e6;  // E [Pa]
 
 // A strip of 20 x 10 mm between grips, its growth rings across the pull.
@@ -36,8 +36,7 @@ MeasuredFields lattice_of_subsets() {
     fields.by_displacement = true;
     fields.instants = {0.075e-3, 0.15e-3};
     for (double y = 0.5e-3; y < 9.5e-3; y += fields.subset)
-        for (double x = 0.5e-3; x < 19.5e-3; x += fields.subset)
-            fields.places.emplace_back(x, y);
+        for (double x = 0.5e-3; x < 19.5e-3; x += fields.subset) fields.places.emplace_back(x, y);
     return fields;
 }
 
@@ -56,8 +55,7 @@ Experiment measure(Scene scene, MeasuredFields fields, double noise_px, unsigned
         fields.sigma.emplace_back(fields.places.size(), noise_px * pixel);
     }
     double peak = 0;
-    for (const Instant& row : record.series)
-        peak = std::max(peak, std::abs(row.force));
+    for (const Instant& row : record.series) peak = std::max(peak, std::abs(row.force));
     for (const Instant& row : record.series) {
         experiment.data.displacement.push_back(row.displacement);
         experiment.data.force.push_back(row.force + 0.005 * peak * normal(generator));
@@ -102,9 +100,9 @@ void expect_moduli(const Fit& found, const char* what) {
     const double truth[] = {true_earlywood / 1e6, true_latewood / 1e6};
     for (int j = 0; j < 2; ++j) {
         const FittedParameter& p = found.parameters[j];
-        std::printf("%s, %s: %.2f MPa (%+.2f %% of %.0f), 95 %% within %.2f .. %.2f; %zu runs, reduced chi-square %.3g, %.1f s\n", what,
-                    p.name.c_str(), p.value, 100 * (p.value / truth[j] - 1), truth[j], p.lower_95, p.upper_95, found.runs.size(),
-                    found.reduced_chi_square, found.seconds);
+        std::printf("%s, %s: %.2f MPa (%+.2f %% of %.0f), 95 %% within %.2f .. %.2f; %zu runs, reduced chi-square %.3g, %.1f s\n",
+                    what, p.name.c_str(), p.value, 100 * (p.value / truth[j] - 1), truth[j], p.lower_95, p.upper_95,
+                    found.runs.size(), found.reduced_chi_square, found.seconds);
         EXPECT_NEAR(p.value, truth[j], 0.03 * truth[j]);
         EXPECT_LE(p.lower_95, truth[j]);
         EXPECT_GE(p.upper_95, truth[j]);
@@ -112,8 +110,8 @@ void expect_moduli(const Fit& found, const char* what) {
     std::printf("%s\n%s\n", found.method.c_str(), found.message.c_str());
 }
 
-// The bar of the issue: both moduli within 3 %, the truth within the 95 % intervals. The test is made on a grid of half the cell, so
-// that the model's own error takes part.
+// The bar of the issue: both moduli within 3 %, the truth within the 95 % intervals. The test is made on a grid of half the cell,
+// so that the model's own error takes part.
 TEST(VerificationFields, ModuliOfBothWoodsComeOutOfOneTensileField) {
     const Experiment measured = measure(strip(0.1e-3), lattice_of_subsets(), 0.01, 1);
     expect_moduli(fit(study_of(measured, 0.2e-3)), "fixed to the picture, camera free");
@@ -147,8 +145,7 @@ TEST(UnitFields, AStillCameraSeesTheWholeMotion) {
     EXPECT_LT(misfit(FieldComparison(measured), record), 1e-9);
     const double shift = 0.1 * pixel;
     for (std::vector<Vec2>& moved : measured.fields->moved)
-        for (Vec2& m : moved)
-            m.x() += shift;
+        for (Vec2& m : moved) m.x() += shift;
     const double points = 2.0 * static_cast<double>(measured.fields->places.size());
     EXPECT_NEAR(misfit(FieldComparison(measured), record), 100 * points, 1e-3 * 100 * points);  // ten sigma each
     measured.fields->camera_moves = true;
@@ -191,7 +188,8 @@ TEST(UnitFields, ASubsetIsAveragedAsItsWarpIsFitted) {
         }
         EXPECT_NEAR(sum, 1, 1e-12);
         EXPECT_NEAR(linear, 0, 1e-12);
-        EXPECT_NEAR(squares, order == 1 ? (1 - 1.0 / (samples_a_side * samples_a_side)) / 12 : 0, 1e-12);  // midpoint rule for 1/12
+        EXPECT_NEAR(squares, order == 1 ? (1 - 1.0 / (samples_a_side * samples_a_side)) / 12 : 0,
+                    1e-12);  // midpoint rule for 1/12
     }
 }
 
@@ -200,8 +198,7 @@ TEST(UnitFields, ProbesReadTheMotionOfThePoints) {
     for (const SolverKind kind : {SolverKind::quasistatic, SolverKind::explicit_dynamics}) {
         Scene scene = strip(0.5e-3);
         scene.solver.kind = kind;
-        if (kind == SolverKind::explicit_dynamics)
-            scene.edges[1].velocity = {1.0, 0.0};
+        if (kind == SolverKind::explicit_dynamics) scene.edges[1].velocity = {1.0, 0.0};
         Crack crack;
         crack.points = {Vec2(10.1e-3, 10e-3), Vec2(10.1e-3, 4.1e-3)};
         scene.cracks = {crack};

@@ -109,8 +109,8 @@ TEST_P(EveryMethod, GivesTheSameBitsForAnyNumberOfThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(SystemFit, EveryMethod,
-                         ::testing::Values("auto", "ceres", "bobyqa", "sbplx", "cobyla", "neldermead", "crs2", "isres",
-                                           "direct", "mlsl"),
+                         ::testing::Values("auto", "ceres", "bobyqa", "sbplx", "cobyla", "neldermead", "crs2", "isres", "direct",
+                                           "mlsl"),
                          [](const auto& test) { return test.param; });
 
 TEST(SystemFit, FailedRunsOfEveryKindAreRecordedAndTheFitGoesOn) {

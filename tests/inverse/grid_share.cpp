@@ -30,15 +30,17 @@ Scene walked(bool extrapolates) {
     return scene;
 }
 
-// Where cells twice as wide answer at the best point as this grid does so far off, their fit lies as far off on the other side, and as much is
-// left on this one: of a plain grid all of it, of two that have been extrapolated three quarters.
+// Where cells twice as wide answer at the best point as this grid does so far off, their fit lies as far off on the other side,
+// and as much is left on this one: of a plain grid all of it, of two that have been extrapolated three quarters.
 TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
     const Eigen::Vector2d off(-0.01, 0.004);
     for (const bool extrapolates : {false, true}) {
         Study study = wedge_study(FakeWedge{.sharpness = 1.0});
         study.experiments[0].scene = walked(extrapolates);
-        const StudyModel model(study, [](const Scene& scene, const std::atomic<bool>*) { return FakeWedge{.sharpness = 1.0}(scene); }, 0.0, nullptr);
-        Objective objective(2, [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); }, 1000, 1);
+        const StudyModel model(
+            study, [](const Scene& scene, const std::atomic<bool>*) { return FakeWedge{.sharpness = 1.0}(scene); }, 0.0, nullptr);
+        Objective objective(
+            2, [&](const Eigen::VectorXd& x, int threads) { return model.evaluate(x, threads); }, 1000, 1);
         const double width = std::log(400.0 / 20.0);
         objective.at(Eigen::Vector2d(std::log(true_earlywood / 20) / width, std::log(true_latewood / 20) / width));
         const crampfit::Run best = *objective.best();
@@ -63,7 +65,12 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     const Eigen::Vector2d x(0.5, 0.4), left(0.01, -0.02);
     Fit fit;
     for (int j = 0; j < 2; ++j) {
-        fit.parameters.push_back({.name = "", .key = "", .value = box.value(j, x[j]), .unit = "", .lower_95 = box.value(j, x[j] - 0.1), .upper_95 = box.value(j, x[j] + 0.1)});
+        fit.parameters.push_back({.name = "",
+                                  .key = "",
+                                  .value = box.value(j, x[j]),
+                                  .unit = "",
+                                  .lower_95 = box.value(j, x[j] - 0.1),
+                                  .upper_95 = box.value(j, x[j] + 0.1)});
     }
     fit.covariance = Eigen::Vector2d(4, 9).asDiagonal();
     take_in_grid(fit, box, x, left);

@@ -53,8 +53,9 @@ time = "10 s"
 }
 
 std::string parameter(const std::string& key, const std::string& initial, const std::string& lower, const std::string& upper) {
-    return fmt::format("[[parameters]]\nname = \"{}\"\nkey = \"materials.EW.{}\"\ninitial = {}\nlower = {}\nupper = {}\nscale = \"log\"\n", key, key,
-                       initial, lower, upper);
+    return fmt::format(
+        "[[parameters]]\nname = \"{}\"\nkey = \"materials.EW.{}\"\ninitial = {}\nlower = {}\nupper = {}\nscale = \"log\"\n", key,
+        key, initial, lower, upper);
 }
 
 /// Fits from other values to curves of force over time, or over displacement where it rises to the end.
@@ -67,9 +68,10 @@ Fit fit_again(const std::string& scene_text, const std::string& parameters, bool
         curves.force.push_back(row.force);
     }
     write_curves(curves, folder / "data.csv");
-    const Study study = read_study(folder.write("study.toml", "[[experiments]]\nname = \"bar\"\nscene = \"scene.toml\"\ndata = \"data.csv\"\n"
-                                                              "noise = { force = \"0.01 N\" }\n" +
-                                                                  parameters + "[optimizer]\nstarts = 1\nmax_runs = 200\n"));
+    const Study study =
+        read_study(folder.write("study.toml", "[[experiments]]\nname = \"bar\"\nscene = \"scene.toml\"\ndata = \"data.csv\"\n"
+                                              "noise = { force = \"0.01 N\" }\n" +
+                                                  parameters + "[optimizer]\nstarts = 1\nmax_runs = 200\n"));
     const KeptWalks walks(study, 1);
     EXPECT_FALSE(walks.has_slopes());
     FitOptions options;
@@ -79,8 +81,9 @@ Fit fit_again(const std::string& scene_text, const std::string& parameters, bool
 }
 
 TEST(SystemHistory, APronySeriesIsFoundAgain) {
-    const Fit fit = fit_again(bar("kind = \"viscoelastic\"\nprony = [ { g = 0.3, k = 0.3, tau = \"2 s\" } ]", "0.5 s"),
-                              parameter("prony.0.g", "0.5", "0.05", "0.9") + parameter("prony.0.tau", "\"1 s\"", "\"0.1 s\"", "\"20 s\""), true);
+    const Fit fit = fit_again(
+        bar("kind = \"viscoelastic\"\nprony = [ { g = 0.3, k = 0.3, tau = \"2 s\" } ]", "0.5 s"),
+        parameter("prony.0.g", "0.5", "0.05", "0.9") + parameter("prony.0.tau", "\"1 s\"", "\"0.1 s\"", "\"20 s\""), true);
     ASSERT_EQ(fit.parameters.size(), 2U);
     std::printf("g %.4f, tau %.4f s\n", fit.parameters[0].value, fit.parameters[1].value);
     EXPECT_NEAR(fit.parameters[0].value, 0.3, 0.003);

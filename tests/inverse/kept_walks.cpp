@@ -1,5 +1,5 @@
-#include "forward/simulate.hpp"
 #include "inverse/kept_walks.hpp"
+#include "forward/simulate.hpp"
 #include "inverse/stress_unit.hpp"
 
 #include <gtest/gtest.h>

@@ -19,8 +19,9 @@ Instant on_soft_machine(const FakeWedge& wedge, const Machine& machine, double d
     double length = wedge.first_length, reached = 0;
     for (int i = 0; i <= lengths && reached <= displacement; ++i) {
         const double a = std::lerp(wedge.first_length, wedge.last_length, static_cast<double>(i) / lengths);
-        const double critical = wedge.critical_displacement(a, true_earlywood, true_latewood) * (1 + machine.compliance * wedge.stiffness(a)) +
-                                machine.displacement_offset;
+        const double critical =
+            wedge.critical_displacement(a, true_earlywood, true_latewood) * (1 + machine.compliance * wedge.stiffness(a)) +
+            machine.displacement_offset;
         reached = std::max(reached, critical);
         length = reached <= displacement || i == 0 ? a : length;
     }
@@ -61,7 +62,7 @@ TEST(VerificationMachine, SoftMachineFeedsJumps) {
     }
     std::printf("soft machine: force within %.1e N of 1 N, crack length within %.1e m, %d of 1000 next to a jump\n", worst_force,
                 worst_length, far_off);
-    EXPECT_LE(far_off, 4);           // as many as there are jumps
+    EXPECT_LE(far_off, 4);            // as many as there are jumps
     EXPECT_LT(worst_length, 2.4e-6);  // the lengths stand 2 um and 0.4 um apart
     EXPECT_LT(worst_force, 1e-3);
 }
@@ -76,7 +77,8 @@ Parameter of_machine(const char* key, double lower, double upper) {
     return parameter;
 }
 
-// Toughnesses and everything about the machine from one test without noise, and a run of the scene for each pair of toughnesses only.
+// Toughnesses and everything about the machine from one test without noise, and a run of the scene for each pair of toughnesses
+// only.
 TEST(SystemMachine, FoundBesideToughnessWithoutFurtherRuns) {
     FakeWedge wedge;
     wedge.sharpness = 1;
@@ -102,7 +104,8 @@ TEST(SystemMachine, FoundBesideToughnessWithoutFurtherRuns) {
         EXPECT_NEAR(fit.parameters[j].value / truth[j], 1, 1e-5);
     }
     std::printf("%zu evaluations, %d runs of the scene\n", fit.runs.size(), calls);
-    EXPECT_LT(calls, 0.6 * static_cast<double>(fit.runs.size()));  // of 1 + 2 x 5 points of a difference stencil 5 change a toughness
+    EXPECT_LT(calls,
+              0.6 * static_cast<double>(fit.runs.size()));  // of 1 + 2 x 5 points of a difference stencil 5 change a toughness
 }
 
 TEST(SystemMachine, FixedValuesMoveTheModelToo) {

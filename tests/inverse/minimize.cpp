@@ -205,8 +205,7 @@ TEST_P(Methods, FindsTheMinimumWithinTheBox) {
     minimize(objective, Vector2d(0.1, 0.9), {GetParam(), 3});
     // Evolution (isres) comes no closer with so many runs, the others by far.
     const double tolerance = GetParam() == "isres" ? 0.03 : 0.002;
-    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), tolerance)
-        << objective.best()->x.transpose();
+    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), tolerance) << objective.best()->x.transpose();
     for (const auto& run : objective.runs()) {
         EXPECT_TRUE((run.x.array() >= 0).all() && (run.x.array() <= 1).all());
     }
@@ -223,8 +222,7 @@ TEST_P(Methods, GoesOnWhenOneRunInFiveFails) {
         failed += run.evaluation->usable() ? 0 : 1;
     }
     EXPECT_GT(failed, 0);
-    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), 0.03)
-        << objective.best()->x.transpose();
+    EXPECT_LT((objective.best()->x - Vector2d(0.6, 0.3)).cwiseAbs().maxCoeff(), 0.03) << objective.best()->x.transpose();
 }
 
 TEST_P(Methods, KeepsToTheBudgetAndSaysSo) {
@@ -256,8 +254,7 @@ TEST_P(Methods, PassesOnOurOwnExceptions) {
     EXPECT_THROW(minimize(objective, Vector2d(0.1, 0.9), {GetParam()}), std::logic_error);
 }
 
-INSTANTIATE_TEST_SUITE_P(UnitMinimize, Methods, ::testing::ValuesIn(method_names()),
-                         [](const auto& test) { return test.param; });
+INSTANTIATE_TEST_SUITE_P(UnitMinimize, Methods, ::testing::ValuesIn(method_names()), [](const auto& test) { return test.param; });
 
 // Two hollows: one at 0.2 where the search begins, with a misfit of some 36, and the true one at 0.8.
 TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {

@@ -102,7 +102,8 @@ TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
         double before = 0;
         for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
             const FitResidual& station = comparison.stations()[i];
-            if (station.kind != "arrival" || station.measured < 0.1e-3 || station.measured > 0.9e-3) continue;  // growth begins and ends there
+            if (station.kind != "arrival" || station.measured < 0.1e-3 || station.measured > 0.9e-3)
+                continue;  // growth begins and ends there
             const double residual = (modelled[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma;
             squares += residual * residual;
             neighbours += residual * before;
@@ -110,7 +111,8 @@ TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
             before = residual;
         }
     }
-    std::printf("%.0f stations a draw, mean square %.2f, autocorrelation %.3f\n", count / draws, squares / count, neighbours / squares);
+    std::printf("%.0f stations a draw, mean square %.2f, autocorrelation %.3f\n", count / draws, squares / count,
+                neighbours / squares);
     EXPECT_NEAR(squares / count, 1, 0.15);
     EXPECT_NEAR(neighbours / squares, 0, 0.1);
 }

@@ -19,7 +19,8 @@
 namespace crampfit::testing {
 namespace {
 
-template <class Design> std::vector<double> values_at(const Design& design, double (*f)(const Eigen::VectorXd&)) {
+template <class Design>
+std::vector<double> values_at(const Design& design, double (*f)(const Eigen::VectorXd&)) {
     std::vector<double> values;
     for (const Eigen::VectorXd& x : design.points()) {
         values.push_back(f(x));
@@ -83,10 +84,10 @@ void expect_all_inside(double (*f)(const Eigen::VectorXd&), const Truth& truth, 
             for (std::size_t j = 0; j < truth.first.size(); ++j) {
                 const bool both = inside(indices.first[j], truth.first[j]) && inside(indices.total[j], truth.total[j]);
                 if (seed == 1) {
-                    std::printf("%s, %d rows, x%zu: first %.4f (%.4f .. %.4f), exact %.4f; total %.4f (%.4f .. %.4f), exact %.4f\n",
-                                what, rows, j + 1, indices.first[j].value, indices.first[j].lower_95,
-                                indices.first[j].upper_95, truth.first[j], indices.total[j].value, indices.total[j].lower_95,
-                                indices.total[j].upper_95, truth.total[j]);
+                    std::printf(
+                        "%s, %d rows, x%zu: first %.4f (%.4f .. %.4f), exact %.4f; total %.4f (%.4f .. %.4f), exact %.4f\n", what,
+                        rows, j + 1, indices.first[j].value, indices.first[j].lower_95, indices.first[j].upper_95, truth.first[j],
+                        indices.total[j].value, indices.total[j].lower_95, indices.total[j].upper_95, truth.total[j]);
                     EXPECT_TRUE(both) << what << ' ' << rows << " rows, x" << j + 1;
                 }
                 missed += both ? 0 : 1;
@@ -118,7 +119,8 @@ TEST(VerificationSensitivity, IndicesConvergeFasterThanDrawnPointsWould) {
             const SaltelliDesign design(3, rows, seed);
             const auto indices = design.indices(values_at(design, ishigami));
             for (std::size_t j = 0; j < 3; ++j) {
-                sum += std::pow(indices.first[j].value - truth.first[j], 2) + std::pow(indices.total[j].value - truth.total[j], 2);
+                sum +=
+                    std::pow(indices.first[j].value - truth.first[j], 2) + std::pow(indices.total[j].value - truth.total[j], 2);
             }
         }
         return std::sqrt(sum / 48);
@@ -182,7 +184,8 @@ TEST(VerificationSensitivity, MorrisMeasuresOfAKnownFunction) {
     const double sigma = std::sqrt(5.0 / 36), fourth_moment = 41.0 / 1296;
     EXPECT_NEAR(measures.mu_star[2].value, 0.5, 4 * sigma / std::sqrt(2000));
     EXPECT_NEAR(measures.sigma[2].value, sigma, 4 * std::sqrt((fourth_moment - std::pow(sigma, 4)) / 8000) / sigma);
-    std::printf("Morris: mu* %.4f, exact 0.5; sigma %.4f, exact %.4f\n", measures.mu_star[2].value, measures.sigma[2].value, sigma);
+    std::printf("Morris: mu* %.4f, exact 0.5; sigma %.4f, exact %.4f\n", measures.mu_star[2].value, measures.sigma[2].value,
+                sigma);
     EXPECT_EQ(measures.mu_star[4].value, 0);
     for (const Eigen::VectorXd& x : design.points()) {
         EXPECT_TRUE((x.array() >= 0).all() && (x.array() <= 1).all());
@@ -198,7 +201,8 @@ TEST(GradientSensitivity, LocalDerivativesAgreeWithCalculus) {
         const auto derivatives = design.derivatives(values);
         const double exact[] = {2 * f(x), -std::exp(0.6) * std::sin(x1)};
         for (std::size_t j = 0; j < 2; ++j) {
-            EXPECT_NEAR(derivatives[j].value, exact[j], 1e-5);  // h^4 / 30 f''''' with h = 0.015, or four times as wide on one side
+            EXPECT_NEAR(derivatives[j].value, exact[j],
+                        1e-5);  // h^4 / 30 f''''' with h = 0.015, or four times as wide on one side
             EXPECT_TRUE(inside(derivatives[j], exact[j]));
         }
         values[1] = std::numeric_limits<double>::quiet_NaN();
@@ -252,7 +256,8 @@ Study output_study(SensitivityMethod method, int samples) {
     Study study = wedge_study(FakeWedge{});
     study.scene = study.experiments[0].scene;
     study.experiments.clear();
-    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0}, {"initial stiffness", StudyOutput::Kind::initial_stiffness, 0, 0}};
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0},
+                     {"initial stiffness", StudyOutput::Kind::initial_stiffness, 0, 0}};
     study.sensitivity = {method, samples};
     return study;
 }

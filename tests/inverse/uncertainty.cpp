@@ -17,8 +17,8 @@ TEST(SystemUncertainty, NamesParametersThatCannotBeToldApart) {
         for (int i = 0; i <= 100; ++i) {
             Instant instant;
             instant.displacement = 1e-5 * i;
-            instant.force = 1e-3 * scene.materials.at("EW").toughness * scene.materials.at("LW").toughness *
-                            instant.displacement / 1e-3;
+            instant.force =
+                1e-3 * scene.materials.at("EW").toughness * scene.materials.at("LW").toughness * instant.displacement / 1e-3;
             record.series.push_back(instant);
         }
         return record;
@@ -35,8 +35,7 @@ TEST(SystemUncertainty, NamesParametersThatCannotBeToldApart) {
         options.forward = product;
         const Fit fit = fit_study(study, options);
         EXPECT_NEAR(fit.parameters[0].value * fit.parameters[1].value, 20000, 100);
-        EXPECT_NE(fit.message.find("'EW toughness' and 'LW toughness' cannot be told apart"), std::string::npos)
-            << fit.message;
+        EXPECT_NE(fit.message.find("'EW toughness' and 'LW toughness' cannot be told apart"), std::string::npos) << fit.message;
         for (const FittedParameter& parameter : fit.parameters) {
             EXPECT_NEAR(parameter.lower_95, 20, 1e-9);
             EXPECT_NEAR(parameter.upper_95, 400, 1e-9);

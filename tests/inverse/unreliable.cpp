@@ -1,5 +1,5 @@
-// A solver of whose runs one in five fails and one in twenty hangs, at points drawn at random: fits come to the same optimum as with one
-// that never does, and sensitivity studies to the same indices.
+// A solver of whose runs one in five fails and one in twenty hangs, at points drawn at random: fits come to the same optimum as
+// with one that never does, and sensitivity studies to the same indices.
 #include "inverse/fit.hpp"
 #include "inverse/sensitivity.hpp"
 #include "tests/inverse/fake_wedge.hpp"
@@ -50,8 +50,8 @@ struct Losses {
 
 class Unreliable : public ::testing::TestWithParam<const char*> {};
 
-// The lowest misfit is that of a simplex with time enough. Methods that step by differences end a part of a standard error from it where no run
-// fails too.
+// The lowest misfit is that of a simplex with time enough. Methods that step by differences end a part of a standard error from
+// it where no run fails too.
 TEST_P(Unreliable, FitsComeToTheSameOptimum) {
     Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
     study.optimizer = {.method = "sbplx", .starts = 4, .max_runs = 2000};
@@ -64,8 +64,8 @@ TEST_P(Unreliable, FitsComeToTheSameOptimum) {
         options.forward = unreliable(seed);
         const Fit fit = fit_study(study, options);
         const Losses losses(fit.runs);
-        std::printf("%s: of %zu runs %d failed, %d hung; misfit %.2f, lowest %.2f; %s\n", GetParam(), fit.runs.size(), losses.lost, losses.hung,
-                    fit.misfit, lowest.misfit, name(fit.status));
+        std::printf("%s: of %zu runs %d failed, %d hung; misfit %.2f, lowest %.2f; %s\n", GetParam(), fit.runs.size(),
+                    losses.lost, losses.hung, fit.misfit, lowest.misfit, name(fit.status));
         EXPECT_GT(losses.lost, 0);
         EXPECT_EQ(fit.status, FitStatus::converged);
         for (std::size_t j = 0; j < fit.parameters.size(); ++j) {
@@ -84,7 +84,8 @@ TEST(SystemUnreliable, SensitivityStudiesComeToTheSameIndices) {
     Study study = wedge_study(FakeWedge{});
     study.scene = study.experiments[0].scene;
     study.experiments.clear();
-    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0}, {"work of fracture", StudyOutput::Kind::work_of_fracture, 0, 0}};
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0},
+                     {"work of fracture", StudyOutput::Kind::work_of_fracture, 0, 0}};
     study.time_limit = limit;
     for (const auto& [method, samples] : {std::pair(SensitivityMethod::morris, 40), std::pair(SensitivityMethod::sobol, 128)}) {
         study.sensitivity = {method, samples};
@@ -103,8 +104,8 @@ TEST(SystemUnreliable, SensitivityStudiesComeToTheSameIndices) {
         for (std::size_t i = 0; i < rest.indices.size(); ++i) {
             const SensitivityIndex& whole = all_well.indices[i];
             const SensitivityIndex& part = rest.indices[i];
-            std::printf("  %s by %s, %s: %.3g, of what is left %.3g (%.3g .. %.3g)\n", whole.output.c_str(), whole.parameter.c_str(), whole.kind.c_str(),
-                        whole.value, part.value, part.lower_95, part.upper_95);
+            std::printf("  %s by %s, %s: %.3g, of what is left %.3g (%.3g .. %.3g)\n", whole.output.c_str(),
+                        whole.parameter.c_str(), whole.kind.c_str(), whole.value, part.value, part.lower_95, part.upper_95);
             EXPECT_GE(whole.value, part.lower_95);
             EXPECT_LE(whole.value, part.upper_95);
         }

@@ -14,7 +14,8 @@ namespace {
 // Residuals of Powell's badly placed kind: exact in the first parameter, curved in the second, zero at (0.7, 0.3).
 Eigen::VectorXd residuals(const Eigen::VectorXd& x) {
     Eigen::VectorXd r(3);
-    r << 10.0 * (x[0] - 0.7) + std::exp(3.0 * x[1]) - std::exp(0.9), 20.0 * (x[1] * x[1] - 0.09), std::sin(5.0 * (x[0] - 0.7)) * x[1];
+    r << 10.0 * (x[0] - 0.7) + std::exp(3.0 * x[1]) - std::exp(0.9), 20.0 * (x[1] * x[1] - 0.09),
+        std::sin(5.0 * (x[0] - 0.7)) * x[1];
     return r;
 }
 
@@ -31,12 +32,13 @@ Evaluation evaluation(const Eigen::VectorXd& r) { return {"finished", r, r, r.sq
 
 TEST(UnitWalkDescent, FindsTheLowestPointInFewRuns) {
     for (const auto& [first, second] : {std::pair{0.1, 0.9}, {0.9, 0.1}, {0.5, 0.6}}) {
-        Objective objective(2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 100, 1);
+        Objective objective(
+            2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 100, 1);
         const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
             return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
         };
-        const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(first, second), 1,
-                                                    [](const std::string&) {});
+        const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0,
+                                                    Eigen::Vector2d(first, second), 1, [](const std::string&) {});
         ASSERT_NE(objective.best(), nullptr);
         const Eigen::VectorXd best = objective.best()->x;
         std::printf("from (%.1f, %.1f): %zu runs, off by %.1e\n", first, second, objective.runs().size(),
@@ -56,7 +58,8 @@ TEST(UnitWalkDescent, FindsTheSamePointWhereRunsFail) {
         const auto or_failure = [&](const Eigen::VectorXd& x, const Eigen::VectorXd& r) {
             return fails(x) ? Evaluation{"lost", {}, {}} : evaluation(r);
         };
-        Objective objective(2, [&](const Eigen::VectorXd& x, int) { return or_failure(x, residuals(x)); }, 100, 1);
+        Objective objective(
+            2, [&](const Eigen::VectorXd& x, int) { return or_failure(x, residuals(x)); }, 100, 1);
         const Near near = [&](const Eigen::VectorXd& point) -> Objective::Evaluate {
             return [&, point](const Eigen::VectorXd& x, int) { return or_failure(x, residuals_near(point, x)); };
         };
@@ -76,12 +79,13 @@ TEST(UnitWalkDescent, FindsTheSamePointWhereRunsFail) {
 }
 
 TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
-    Objective objective(2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 2, 1);
+    Objective objective(
+        2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 2, 1);
     const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
         return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
     };
-    const SearchResult found =
-        descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(0.1, 0.9), 1, [](const std::string&) {});
+    const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(0.1, 0.9),
+                                                1, [](const std::string&) {});
     EXPECT_FALSE(found.converged);
     EXPECT_EQ(objective.runs().size(), 2u);
 }

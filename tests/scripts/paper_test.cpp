@@ -25,7 +25,9 @@ struct Trip {
 // A sample with the loading at a speed [m/s].
 Trip run(const std::string& sample, double speed, double cell_mm, Overrides further = {}) {
     const auto number = [](double value) { return std::to_string(value); };
-    Overrides overrides = {{"model.cell", number(cell_mm) + " mm"}, {"cracks.0.advance", "0.2 mm"}, {"output.frames", "0"},
+    Overrides overrides = {{"model.cell", number(cell_mm) + " mm"},
+                           {"cracks.0.advance", "0.2 mm"},
+                           {"output.frames", "0"},
                            {"output.samples", "1000"}};
     overrides.emplace_back("solver.kind", speed == at_equilibrium ? "quasistatic" : "explicit");
     if (speed != at_equilibrium) {
@@ -134,7 +136,8 @@ double apart(const Trip& from, const Trip& to) {
         double nearest = INFINITY;
         for (std::size_t k = 0; k + 1 < other.size(); ++k) {
             const Vec2 along = other[k + 1] - other[k];
-            nearest = std::min(nearest, (x - other[k] - std::clamp((x - other[k]).dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm());
+            nearest = std::min(
+                nearest, (x - other[k] - std::clamp((x - other[k]).dot(along) / along.squaredNorm(), 0.0, 1.0) * along).norm());
         }
         most = std::max(most, nearest);
     }
@@ -163,7 +166,8 @@ TEST(SlowPaper, TrPlusForceRisesAndFallsAtLatewood) {
     }
 }
 
-// Boxes about the tip once took more energy off, along bands that lie askew, than an advance releases: the crack stopped for good.
+// Boxes about the tip once took more energy off, along bands that lie askew, than an advance releases: the crack stopped for
+// good.
 TEST(SlowPaper, TrMinusGoesThroughAtEquilibrium) {
     double peak[2];
     for (const int fine : {0, 1}) {
@@ -196,23 +200,26 @@ TEST(SlowPaper, TrMinusTakesAnotherWayAtTheHighestRate) {
 TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
     for (const double speed : {at_equilibrium, 2.0, 5.0, 10.0}) {
         const double across = zig_zag(run("tension_tr_plus", speed, 0.2));
-        const double at_45 = zig_zag(run("tension_tr135", speed, 0.2, turned_by_45)), at_135 = zig_zag(run("tension_tr135", speed, 0.2));
-        std::printf("at %.0f m/s: direction varies by %.1f degrees across the rings, %.1f at 45, %.1f at 135 degrees\n", speed, across, at_45,
-                    at_135);
+        const double at_45 = zig_zag(run("tension_tr135", speed, 0.2, turned_by_45)),
+                     at_135 = zig_zag(run("tension_tr135", speed, 0.2));
+        std::printf("at %.0f m/s: direction varies by %.1f degrees across the rings, %.1f at 45, %.1f at 135 degrees\n", speed,
+                    across, at_45, at_135);
         EXPECT_GT(at_45, 1.5 * across);
         EXPECT_GT(at_135, 1.5 * across);
     }
 }
 
-// The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness latewood
-// turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no more of its way in
-// latewood than the straight way on does, over which the waving band leans. At equilibrium one that starts in latewood does not leave it.
+// The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness
+// latewood turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no
+// more of its way in latewood than the straight way on does, over which the waving band leans. At equilibrium one that starts in
+// latewood does not leave it.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const Trip from_earlywood = run("tension_rt", speed, 0.1);
         const double outside = spent(from_earlywood).latewood(), straight = latewood_straight_ahead(from_earlywood.scene);
         const double inside = spent(run("tension_rt", speed, 0.1, from_latewood)).latewood();
-        std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, straight on %.0f %%; started in latewood %.0f %%\n",
+        std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, straight on %.0f %%; started in "
+                    "latewood %.0f %%\n",
                     speed, 100 * outside, 100 * straight, 100 * inside);
         EXPECT_LE(outside, straight + 0.02);  // the rows of a record are up to 0.01 of the way apart
         if (speed == at_equilibrium) EXPECT_GT(inside, 0.7);
@@ -225,8 +232,9 @@ TEST(SlowPaper, WedgeIsStraighterThanTension) {
         const Trip wedge = run("wedge", speed, 0.2);
         const double split = zig_zag(wedge), pulled = zig_zag(run("tension_tr_minus", speed, 0.2));
         const int count = falls(wedge.record, 0.1);
-        std::printf("at %.0f m/s: direction varies by %.1f degrees in the wedge test, %.1f in tension; wedge force falls %d times\n", speed,
-                    split, pulled, count);
+        std::printf(
+            "at %.0f m/s: direction varies by %.1f degrees in the wedge test, %.1f in tension; wedge force falls %d times\n",
+            speed, split, pulled, count);
         EXPECT_LT(split, pulled);
         EXPECT_GE(count, 1);
     }
