@@ -25,14 +25,14 @@ constexpr double stiffness_in_cells = 10.0;
 // cells 4.6 %. Chosen by that, as is where the mean ends.
 constexpr double width_in_cells = 1.0;
 constexpr double width_in_radii = 0.2;
-constexpr double most_radius_in_cells =
-    16.0;  // beyond it the grid's bends are small, and contact so wide that its tangent is dear
+// Beyond it the grid's bends are small, and contact so wide that its tangent is dear.
+constexpr double most_radius_in_cells = 16.0;
 
 // Over twice this depth, in cells, contact sets in: the force grows mostly with its square there, so that Newton's method sees a
 // touch coming; from there on it grows evenly.
 constexpr double onset_in_cells = 0.0003;
-constexpr double at_touch =
-    0.1;  // part of the stiffness that is there from the first touch, so that a body at rest on it is held
+// Part of the stiffness that is there from the first touch, so that a body at rest on it is held.
+constexpr double at_touch = 0.1;
 
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
@@ -264,48 +264,54 @@ double SlidingBody::sunk_at(int facet) const {
 void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement) {
     constexpr int most_iterations = 60, most_halvings = 8;
     constexpr double tolerance_in_cells = 1e-12;
+    constexpr double reach_in_cells = 0.25;  // of facets that may touch: wood rises by far less beside what is pressed
     const double cell = body_.layout.cell.minCoeff();
-    const Eigen::MatrixXd& yield = yield_->yield();
     struct Met {
-        LocalYield::Place place;
-        double stiffness, depth;
+        int station;
+        double share, stiffness, depth;
     };
     std::vector<Met> met;
-    for (const int i : near_)
-        if (yield_->holds(i))
-            met.push_back({yield_->place(i), stiffness_[i], signed_depth(shape_, current(i, displacement) - moved)});
-    sunk_ = Eigen::VectorXd::Zero(yield.rows());
-    Eigen::VectorXd force;
-    Eigen::MatrixXd stiffness;
-    const auto residual = [&](const Eigen::VectorXd& s, bool with_stiffness) -> Eigen::VectorXd {
-        force = Eigen::VectorXd::Zero(yield.rows());
-        if (with_stiffness) stiffness = Eigen::MatrixXd::Zero(yield.rows(), yield.rows());
+    std::vector<int> stations;
+    for (const int i : near_) {
+        if (!yield_->holds(i)) continue;
+        const double depth = signed_depth(shape_, current(i, displacement) - moved);
+        if (depth < -reach_in_cells * cell) continue;
+        const LocalYield::Place& place = yield_->place(i);
+        met.push_back({place.station, place.share, stiffness_[i], depth});
+        stations.insert(stations.end(), {place.station, place.station + 1});
+    }
+    std::ranges::sort(stations);
+    stations.erase(std::ranges::unique(stations).begin(), stations.end());
+    for (Met& m : met) m.station = static_cast<int>(std::ranges::lower_bound(stations, m.station) - stations.begin());
+    const auto count = static_cast<Eigen::Index>(stations.size());
+    const Eigen::MatrixXd yield = yield_->yield()(stations, stations);
+    Eigen::VectorXd sunk = Eigen::VectorXd::Zero(count), force(count);
+    Eigen::MatrixXd springs(count, count);
+    const auto residual = [&](const Eigen::VectorXd& s) -> Eigen::VectorXd {
+        force.setZero();
+        springs.setZero();
         for (const Met& m : met) {
-            const int at = m.place.station;
-            const double b = m.place.share, a = 1.0 - b;
-            const Press pressed = press(m.stiffness, m.depth - a * s[at] - b * s[at + 1], onset_in_cells * cell);
-            if (pressed.force <= 0.0) continue;
-            force[at] += a * pressed.force;
-            force[at + 1] += b * pressed.force;
-            if (!with_stiffness) continue;
-            stiffness(at, at) += a * a * pressed.stiffness;
-            stiffness(at, at + 1) += a * b * pressed.stiffness;
-            stiffness(at + 1, at) += a * b * pressed.stiffness;
-            stiffness(at + 1, at + 1) += b * b * pressed.stiffness;
+            const int at = m.station;
+            const Eigen::Vector2d share(1.0 - m.share, m.share);
+            const Press pressed = press(m.stiffness, m.depth - share.dot(s.segment<2>(at)), onset_in_cells * cell);
+            force.segment<2>(at) += pressed.force * share;
+            springs.block<2, 2>(at, at) += pressed.stiffness * share * share.transpose();
         }
         return s - yield * force;
     };
-    Eigen::VectorXd off = residual(sunk_, true);
-    for (int iteration = 0; iteration < most_iterations && off.cwiseAbs().maxCoeff() > tolerance_in_cells * cell; ++iteration) {
-        const Eigen::MatrixXd slope = Eigen::MatrixXd::Identity(yield.rows(), yield.rows()) + yield * stiffness;
-        const Eigen::VectorXd step = -slope.partialPivLu().solve(off);
-        double share = 1.0;
+    Eigen::VectorXd off = residual(sunk);
+    const auto is_off = [&] { return count > 0 && off.cwiseAbs().maxCoeff() > tolerance_in_cells * cell; };
+    for (int iteration = 0; iteration < most_iterations && is_off(); ++iteration) {
+        const Eigen::VectorXd step = -(Eigen::MatrixXd::Identity(count, count) + yield * springs).partialPivLu().solve(off);
         const double before = off.norm();
-        for (int k = 0; k < most_halvings && residual(sunk_ + share * step, false).norm() >= before; ++k) share *= 0.5;
-        sunk_ += share * step;
-        off = residual(sunk_, true);
+        double share = 1.0;
+        off = residual(sunk + step);
+        for (int k = 0; k < most_halvings && off.norm() >= before; ++k) off = residual(sunk + (share *= 0.5) * step);
+        sunk += share * step;
     }
-    yield_energy_ = 0.5 * force.dot(sunk_);
+    yield_energy_ = 0.5 * force.dot(sunk);
+    sunk_ = Eigen::VectorXd::Zero(yield_->stations());
+    sunk_(stations) = sunk;
 }
 
 std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {

@@ -73,6 +73,9 @@ class Equilibrium {
     /// The motion that this load on the points and facets would bring about [N].
     Motion yield_to(const std::vector<Vec2>& load) const;
 
+    /// The displacements that such loads would bring about, both [2 x fields, any number].
+    Eigen::MatrixXd yields_to(Eigen::MatrixXd loads) const;
+
     /// Derivatives by numbers of the materials at this equilibrium.
     struct Slopes {
         Eigen::VectorXd potential;  // [numbers] [J / unit]

@@ -4,7 +4,6 @@
 #include "forward/local_yield.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -223,47 +222,29 @@ void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
     rigid.let_yield(LocalYield::about(way, rigid, scene_, plan_, materials_, body_));
 }
 
-// What the yield s of stations beyond the grid's takes off the springs' stiffness: with s = A P^T N(d - P s) and K = N' the
-// forces follow the depths d by K - K P (1 + A P^T K P)^-1 A P^T K.
+// What the yield of stations beyond the grid's takes off the springs' stiffness K: K P gives P^T K (LocalYield::pressed).
 void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vector<SlidingBody::Touch>& touches) {
-    const LocalYield& local = *rigid.yield();
-    std::vector<int> fields, stations;
-    const auto place = [](std::vector<int>& list, int what) {
-        const auto at = std::find(list.begin(), list.end(), what) - list.begin();
-        if (at == static_cast<std::ptrdiff_t>(list.size())) list.push_back(what);
-        return static_cast<Eigen::Index>(at);
-    };
+    const LocalYield::Pressed pressed = rigid.yield()->pressed(touches);
+    if (pressed.stations.empty()) return;
     const Points& points = body_.points;
-    std::vector<const SlidingBody::Touch*> held;
-    for (const SlidingBody::Touch& touch : touches) {
-        if (!local.holds(touch.facet)) continue;
-        held.push_back(&touch);
-        for (const int next : {0, 1}) place(stations, local.place(touch.facet).station + next);
+    std::vector<int> fields;
+    for (const SlidingBody::Touch& touch : touches)
         for (const SlidingBody::Hold& hold : rigid.holds(touch.facet))
-            for (int k = 0; k < 4; ++k) place(fields, points.node[hold.point][k]);
+            fields.insert(fields.end(), points.node[hold.point].begin(), points.node[hold.point].end());
+    std::ranges::sort(fields);
+    fields.erase(std::ranges::unique(fields).begin(), fields.end());
+    const auto size = static_cast<Eigen::Index>(2 * fields.size());
+    Eigen::MatrixXd push = Eigen::MatrixXd::Zero(size + 2, touches.size());  // on fields and the body, of a unit force
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+        for (const SlidingBody::Hold& hold : rigid.holds(touches[i].facet))
+            for (int k = 0; k < 4; ++k) {
+                const auto at = std::ranges::lower_bound(fields, points.node[hold.point][k]) - fields.begin();
+                push.col(i).segment<2>(2 * at) += hold.weight[k] * touches[i].normal;
+            }
+        push.col(i).tail<2>() -= touches[i].normal;
     }
-    if (held.empty()) return;
-    const auto count = static_cast<Eigen::Index>(stations.size()), size = static_cast<Eigen::Index>(2 * fields.size());
-    Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(size + 2, count);  // on fields and the body, per yield of a station [N/m]
-    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(count, count);
-    for (const SlidingBody::Touch* touch : held) {
-        const LocalYield::Place& at = local.place(touch->facet);
-        for (const int next : {0, 1}) {
-            const Eigen::Index s = place(stations, at.station + next);
-            const double share = next ? at.share : 1.0 - at.share;
-            const Vec2 force = share * touch->stiffness * touch->normal;
-            for (const SlidingBody::Hold& hold : rigid.holds(touch->facet))
-                for (int k = 0; k < 4; ++k)
-                    pull.col(s).segment<2>(2 * place(fields, points.node[hold.point][k])) += hold.weight[k] * force;
-            pull.col(s).tail<2>() -= force;
-            for (const int other : {0, 1})
-                stiffness(s, place(stations, at.station + other)) +=
-                    share * touch->stiffness * (other ? at.share : 1.0 - at.share);
-        }
-    }
-    const Eigen::MatrixXd yield = local.yield()(stations, stations);
-    const Eigen::MatrixXd gives = (Eigen::MatrixXd::Identity(count, count) + yield * stiffness).partialPivLu().solve(yield);
-    const Eigen::MatrixXd change = -pull * (0.5 * (gives + gives.transpose())) * pull.transpose();
+    const Eigen::MatrixXd pull = push * pressed.stiffness.asDiagonal() * pressed.share;
+    const Eigen::MatrixXd change = -pull * pressed.gives * pull.transpose();
     std::vector<int> rows(size + 2);
     std::vector<double> steps(size + 2);
     for (Eigen::Index a = 0; a < size + 2; ++a) {

@@ -1,6 +1,9 @@
 #include "forward/local_yield.hpp"
 
+#include "forward/cut_out.hpp"
+
 #include <Eigen/LU>
+#include <Eigen/SparseCore>
 
 #include <algorithm>
 #include <cmath>
@@ -9,82 +12,62 @@ namespace crampfit {
 
 namespace {
 
-constexpr double margin = 6.0;  // of the box about the facets, in cells
+constexpr double margin = 6.0;                // of the box about the facets, in cells
+constexpr Eigen::Index solved_together = 32;  // loads
 
-// What is cut out. Its sides that are not the specimen's own are held.
-Scene scene_in(const Scene& whole, const Box& box, double cell) {
-    Scene scene = whole;
-    scene.model.cell = cell;
-    scene.specimen.size = box.high - box.low;
-    const auto move = [&](Shape& shape) {
-        if (auto* circle = std::get_if<Circle>(&shape)) circle->centre -= box.low;
-        else
-            for (Vec2& x : std::get<Polygon>(shape).points) x -= box.low;
-    };
-    for (Shape& shape : scene.specimen.cutouts) move(shape);
-    for (Part& part : scene.specimen.parts) move(part.shape);
-    scene.cracks.clear();
-    scene.bodies.clear();
-    scene.edges.clear();
-    return scene;
-}
-
-void hold_sides(Scene& scene, const Discretisation& body, const Box& box, const Vec2& size) {
-    const Vec2 hair = 1e-6 * size;
-    const auto hold = [&](Side side, int axis, bool high) {
-        const double end = high ? body.layout.size()[axis] : 0.0;
-        for (int p = 0; p < body.points.count(); ++p) {
-            const Box domain = body.domain(p);
-            if (std::abs((high ? domain.high : domain.low)[axis] - end) > hair[axis]) continue;
-            scene.edges.push_back({"", side, {}, {0.0, 0.0}, {}, {}});
-            return;
-        }
-    };
-    if (box.low.x() > hair.x()) hold(Side::left, 0, false);
-    if (box.high.x() < size.x() - hair.x()) hold(Side::right, 0, true);
-    if (box.low.y() > hair.y()) hold(Side::bottom, 1, false);
-    if (box.high.y() < size.y() - hair.y()) hold(Side::top, 1, true);
+Plan of_box(Plan plan) {
+    plan.rotates = plan.friction = plan.contact = plan.remembers = plan.free_bodies = false;
+    plan.linear = true;
+    return plan;
 }
 
 }  // namespace
 
-// The box on one grid, and the loads of the stations on its nodes.
+// The box on one grid.
 struct LocalYield::Solved {
-    Solved(const Scene& whole, const Plan& plan, const MaterialMap& wood, const Box& place, double cell)
-        : box(place), small(plan), scene(scene_in(whole, place, cell)), materials(wood.part(place.low)), body(scene, materials) {
-        small.rotates = small.friction = small.contact = small.remembers = small.free_bodies = false;
-        small.linear = true;
-        hold_sides(scene, body, place, whole.specimen.size);
-        if (!scene.edges.empty()) equilibrium = std::make_unique<Equilibrium>(scene, small, materials, body);
+    Solved(const Scene& whole, const Plan& plan, const MaterialMap& wood, const Box& box, double cell)
+        : cut(whole, wood, box, cell), small(of_box(plan)) {
+        for (const Crack& crack : whole.cracks) {
+            const auto runs_through = [&](const Vec2& a, const Vec2& b) { return box.touches({a.cwiseMin(b), a.cwiseMax(b)}); };
+            if (std::ranges::adjacent_find(crack.points, runs_through) == crack.points.end()) continue;
+            cut.scene.cracks.push_back(crack);
+            for (Vec2& x : cut.scene.cracks.back().points) x -= box.low;
+        }
+        if (!cut.scene.edges.empty()) equilibrium.emplace(cut.scene, small, cut.materials, cut.body);
     }
 
-    // Displacements for the load of each station, and what these stations yield.
-    bool solve() {
-        if (!equilibrium->relax(std::vector<Vec2>(loads.front().size(), Vec2::Zero()))) return false;
-        for (const auto& load : loads) states.push_back(equilibrium->yield_to(load).fields);
-        return true;
-    }
+    int fields() const { return equilibrium->cracks().fields(); }
+    bool solve() { return equilibrium->relax(std::vector<Vec2>(fields(), Vec2::Zero())); }
 
-    Eigen::MatrixXd product(const std::vector<std::vector<Vec2>>& with) const {
-        Eigen::MatrixXd found(states.size(), with.size());
-        for (std::size_t s = 0; s < states.size(); ++s)
-            for (std::size_t t = 0; t < with.size(); ++t) {
-                double sum = 0.0;
-                for (std::size_t f = 0; f < with[t].size(); ++f) sum += with[t][f].dot(states[s][f]);
-                found(s, t) = sum;
-            }
+    // Of the stations, to such loads on the fields [2 x fields, any number].
+    Eigen::MatrixXd yield_to(Eigen::MatrixXd with) const { return loads.transpose() * equilibrium->yields_to(std::move(with)); }
+
+    Eigen::MatrixXd compliance() const {
+        Eigen::MatrixXd found(loads.cols(), loads.cols());
+        for (Eigen::Index first = 0; first < loads.cols(); first += solved_together) {
+            const Eigen::Index count = std::min(solved_together, loads.cols() - first);
+            found.middleCols(first, count) = yield_to(loads.middleCols(first, count));
+        }
         return found;
     }
 
-    Box box;
+    // Slope of the compliance by the numbers: -U^T K' U, where U are the displacements of unit forces.
+    void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {
+        const std::vector<MaterialSlope>& here = cut.slopes_by(numbers);
+        for (Eigen::Index station = 0; station < loads.cols(); ++station) {
+            const Eigen::VectorXd state = equilibrium->yields_to(loads.col(station));
+            std::vector<Vec2> displacement(fields());
+            for (int f = 0; f < fields(); ++f) displacement[f] = state.segment<2>(2 * f);
+            equilibrium->set_displacements(displacement, 0.0);
+            const Eigen::MatrixXd yields = yield_to(equilibrium->slopes(here).fields);
+            for (std::size_t n = 0; n < here.size(); ++n) by_number[n].col(station) -= sign * yields.col(n);
+        }
+    }
+
+    CutOutWood cut;
     Plan small;
-    Scene scene;
-    MaterialMap materials;
-    Discretisation body;
-    std::unique_ptr<Equilibrium> equilibrium;
-    std::vector<std::vector<Vec2>> loads;   // [stations][nodes] of unit forces
-    std::vector<std::vector<Vec2>> states;  // [stations][nodes] [m/N]
-    std::vector<MaterialSlope> numbers;
+    std::optional<Equilibrium> equilibrium;  // none: nothing is held
+    Eigen::SparseMatrix<double> loads;       // [2 x fields, stations] unit forces
 };
 
 std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan,
@@ -138,9 +121,8 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
         shares[place.station] += (1.0 - place.share) * facets[i].length;
         shares[place.station + 1] += place.share * facets[i].length;
     }
-    for (const auto& side : {made->coarse_, made->fine_})
-        side->loads.assign(stations, std::vector<Vec2>(side->equilibrium->displacements().size(), Vec2::Zero()));
-    const Discretisation& fine = made->fine_->body;
+    const Discretisation &coarse = made->coarse_->cut.body, &fine = made->fine_->cut.body;
+    std::vector<Eigen::Triplet<double>> on_coarse, on_fine;
     for (const int i : held) {
         const Place& place = made->place(i);
         const Facet& facet = facets[i];
@@ -148,27 +130,32 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
         const auto nearest = std::min_element(fine.facets.begin(), fine.facets.end(), [&](const Facet& a, const Facet& b) {
             return (a.position - x).squaredNorm() < (b.position - x).squaredNorm();
         });
-        const int fine_cell = fine.points.cell[nearest->point];
-        const auto fine_weight = fine.values_at(fine_cell, x);
+        const auto fine_weight = fine.values_at(fine.points.cell[nearest->point], x);
         for (const int next : {0, 1}) {
             const int station = place.station + next;
             const double share = (next ? place.share : 1.0 - place.share) * facet.length;
             if (share == 0.0) continue;
             const Vec2 force = share / shares[station] * facet.normal;
+            const auto add = [&](std::vector<Eigen::Triplet<double>>& loads, std::span<const int> fields, const auto& weight) {
+                for (int k = 0; k < 4; ++k)
+                    for (const int axis : {0, 1}) loads.emplace_back(2 * fields[k] + axis, station, weight[k] * force[axis]);
+            };
             for (const SlidingBody::Hold& hold : rigid.holds(i)) {
                 const int c = body.points.cell[hold.point];
-                const Layout& part = made->coarse_->body.layout;
-                const int inner = part.cell_index(c % layout.cells_x - static_cast<int>(low.x()),
-                                                  c / layout.cells_x - static_cast<int>(low.y()));
-                const auto nodes = part.cell_nodes(inner);
-                for (int k = 0; k < 4; ++k) made->coarse_->loads[station][nodes[k]] += hold.weight[k] * force;
+                const int inner = coarse.layout.cell_index(c % layout.cells_x - static_cast<int>(low.x()),
+                                                           c / layout.cells_x - static_cast<int>(low.y()));
+                const int same = coarse.points.first_of_cell[inner] + hold.point - body.points.first_of_cell[c];
+                add(on_coarse, coarse.points.node[same], hold.weight);
             }
-            const auto nodes = fine.layout.cell_nodes(fine_cell);
-            for (int k = 0; k < 4; ++k) made->fine_->loads[station][nodes[k]] += fine_weight[k] * force;
+            add(on_fine, fine.points.node[nearest->point], fine_weight);
         }
     }
-    if (!made->coarse_->solve() || !made->fine_->solve()) return nullptr;
-    made->yield_ = made->fine_->product(made->fine_->loads) - made->coarse_->product(made->coarse_->loads);
+    for (const auto& [side, loads] : {std::pair{made->coarse_, &on_coarse}, {made->fine_, &on_fine}}) {
+        side->loads.resize(2 * side->fields(), stations);
+        side->loads.setFromTriplets(loads->begin(), loads->end());
+        if (!side->solve()) return nullptr;
+    }
+    made->yield_ = made->fine_->compliance() - made->coarse_->compliance();
     made->yield_ = (0.5 * (made->yield_ + made->yield_.transpose())).eval();
     return made;
 }
@@ -176,46 +163,50 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
 void LocalYield::find_slopes(const std::vector<MaterialSlope>& numbers) {
     if (slopes_.size() == numbers.size()) return;
     slopes_.assign(numbers.size(), Eigen::MatrixXd::Zero(stations(), stations()));
-    for (const auto& [side, sign] : {std::pair{fine_, -1.0}, {coarse_, 1.0}}) {
-        side->numbers.clear();
-        for (const MaterialSlope& number : numbers) side->numbers.emplace_back(number, side->body, side->box.low);
-        std::vector<std::vector<std::vector<Vec2>>> pull(numbers.size());  // [numbers][stations][nodes]
-        for (const auto& state : side->states) {
-            side->equilibrium->set_displacements(state, 0.0);
-            const Equilibrium::Slopes slopes = side->equilibrium->slopes(side->numbers);
-            for (std::size_t n = 0; n < numbers.size(); ++n) {
-                pull[n].emplace_back(state.size());
-                for (std::size_t f = 0; f < state.size(); ++f) pull[n].back()[f] = slopes.fields.col(n).segment<2>(2 * f);
-            }
-        }
-        for (std::size_t n = 0; n < numbers.size(); ++n) slopes_[n] += sign * side->product(pull[n]);
-    }
+    fine_->add_slopes(numbers, 1.0, slopes_);
+    coarse_->add_slopes(numbers, -1.0, slopes_);
 }
 
-// The yield s = A P^T N takes N^T P A P^T N / 2; with forces N(d - P s, p) and K = N' the slopes are
-// ds = (1 + A P^T K P)^-1 (A' P^T N + A P^T N_p) and dN = N_p - K P ds. That of the energy with s as it is: -N^T P A' P^T N / 2.
+// With s = A P^T N(d - P s) and K = N' the yields follow the depths d by (1 + A P^T K P)^-1 A P^T K.
+LocalYield::Pressed LocalYield::pressed(const std::vector<SlidingBody::Touch>& touches) const {
+    Pressed found;
+    std::vector<int>& at = found.stations;
+    for (const SlidingBody::Touch& touch : touches)
+        if (holds(touch.facet)) at.insert(at.end(), {place(touch.facet).station, place(touch.facet).station + 1});
+    std::ranges::sort(at);
+    at.erase(std::ranges::unique(at).begin(), at.end());
+    const auto count = static_cast<Eigen::Index>(at.size()), facets = static_cast<Eigen::Index>(touches.size());
+    found.share = Eigen::MatrixXd::Zero(facets, count);
+    found.stiffness.resize(facets);
+    for (Eigen::Index k = 0; k < facets; ++k) {
+        found.stiffness[k] = touches[k].stiffness;
+        if (!holds(touches[k].facet)) continue;
+        const Place& of_facet = place(touches[k].facet);
+        const auto first = std::ranges::lower_bound(at, of_facet.station) - at.begin();
+        found.share(k, first) = 1.0 - of_facet.share;
+        found.share(k, first + 1) = of_facet.share;
+    }
+    const Eigen::MatrixXd yield = yield_(at, at);
+    const Eigen::MatrixXd springs = found.share.transpose() * found.stiffness.asDiagonal() * found.share;
+    found.gives = (Eigen::MatrixXd::Identity(count, count) + yield * springs).partialPivLu().solve(yield);
+    found.gives = (0.5 * (found.gives + found.gives.transpose())).eval();
+    return found;
+}
+
+// With forces N(d - P s, p) the slopes by p are ds = (1 + A P^T K P)^-1 (A' P^T N + A P^T N_p) and dN = N_p - K P ds. The yield
+// takes N^T P A P^T N / 2; the slope of the energy with s as it is: -N^T P A' P^T N / 2.
 LocalYield::Slope LocalYield::slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces,
                                     const std::vector<MaterialSlope>& numbers, std::size_t number) {
     find_slopes(numbers);
-    Eigen::VectorXd force = Eigen::VectorXd::Zero(stations()), direct = force;
-    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(stations(), stations());
-    const auto for_shares = [&](const SlidingBody::Touch& touch, const auto& visit) {
-        if (!holds(touch.facet)) return;
-        visit(place(touch.facet).station, 1.0 - place(touch.facet).share);
-        visit(place(touch.facet).station + 1, place(touch.facet).share);
-    };
-    for (std::size_t k = 0; k < touches.size(); ++k)
-        for_shares(touches[k], [&](int a, double share) {
-            force[a] += share * touches[k].force;
-            direct[a] += share * forces[k];
-            for_shares(touches[k], [&](int b, double other) { stiffness(a, b) += share * other * touches[k].stiffness; });
-        });
-    const Eigen::VectorXd given = slopes_[number] * force;
-    const Eigen::MatrixXd system = Eigen::MatrixXd::Identity(stations(), stations()) + yield_ * stiffness;
-    const Eigen::VectorXd sinks = system.partialPivLu().solve(given + yield_ * direct);
-    for (std::size_t k = 0; k < touches.size(); ++k)
-        for_shares(touches[k], [&](int a, double share) { forces[k] -= touches[k].stiffness * share * sinks[a]; });
-    return {-0.5 * force.dot(given), std::move(forces)};
+    const Pressed at = pressed(touches);
+    Eigen::VectorXd force(touches.size());
+    for (std::size_t k = 0; k < touches.size(); ++k) force[k] = touches[k].force;
+    const Eigen::VectorXd on_stations = at.share.transpose() * force;
+    const Eigen::VectorXd given = slopes_[number](at.stations, at.stations) * on_stations;
+    const Eigen::VectorXd sinks =
+        given + at.gives * (at.share.transpose() * (forces - at.stiffness.cwiseProduct(at.share * given)));
+    forces -= at.stiffness.cwiseProduct(at.share * sinks);
+    return {-0.5 * on_stations.dot(given), std::move(forces)};
 }
 
 }  // namespace crampfit

@@ -37,6 +37,15 @@ class LocalYield {
     /// Of stations to forces on them, beyond the grid's [m/N]; symmetric.
     const Eigen::MatrixXd& yield() const { return yield_; }
 
+    /// How the stations under a wheel answer to it.
+    struct Pressed {
+        std::vector<int> stations;  // touched, in order
+        Eigen::MatrixXd share;      // [touches x stations] of each facet
+        Eigen::VectorXd stiffness;  // [touches] of their springs [N/m]
+        Eigen::MatrixXd gives;      // [stations x stations] how they yield in series with these; symmetric [m/N]
+    };
+    Pressed pressed(const std::vector<SlidingBody::Touch>& touches) const;
+
     /// Slopes by a number of the energy and of the facets' forces, displacements as they are.
     struct Slope {
         double energy = 0;       // that the yield takes [J / unit]
