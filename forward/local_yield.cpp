@@ -2,6 +2,7 @@
 
 #include "forward/cut_out.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SparseCore>
 
@@ -27,12 +28,6 @@ Plan of_box(Plan plan) {
 struct LocalYield::Solved {
     Solved(const Scene& whole, const Plan& plan, const MaterialMap& wood, const Box& box, double cell)
         : cut(whole, wood, box, cell), small(of_box(plan)) {
-        for (const Crack& crack : whole.cracks) {
-            const auto runs_through = [&](const Vec2& a, const Vec2& b) { return box.touches({a.cwiseMin(b), a.cwiseMax(b)}); };
-            if (std::ranges::adjacent_find(crack.points, runs_through) == crack.points.end()) continue;
-            cut.scene.cracks.push_back(crack);
-            for (Vec2& x : cut.scene.cracks.back().points) x -= box.low;
-        }
         if (!cut.scene.edges.empty()) equilibrium.emplace(cut.scene, small, cut.materials, cut.body);
     }
 
@@ -70,21 +65,14 @@ struct LocalYield::Solved {
     Eigen::SparseMatrix<double> loads;       // [2 x fields, stations] unit forces
 };
 
-std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan,
-                                              const MaterialMap& wood, const Discretisation& body) {
-    const Layout& layout = body.layout;
-    std::shared_ptr<LocalYield> made(new LocalYield);
-    // Stations.
-    const std::vector<Facet>& facets = body.facets;
-    const double pitch = layout.cell.minCoeff() / finer;
+// Gives the facets that are held, in order.
+std::vector<int> LocalYield::place_stations(const Box& where, const std::vector<Facet>& facets, double pitch) {
     std::vector<int> held;
     for (int i = 0; i < static_cast<int>(facets.size()); ++i)
         if (where.contains(facets[i].position)) held.push_back(i);
-    if (held.empty()) return nullptr;
-    made->first_ = held.front();
-    made->places_.assign(held.back() - held.front() + 1, {-1, 0.0});
-    Box around{facets[held.front()].position, facets[held.front()].position};
-    int stations = 0;
+    if (held.empty()) return held;
+    first_ = held.front();
+    places_.assign(held.back() - held.front() + 1, {-1, 0.0});
     for (std::size_t from = 0, to = 0; from < held.size(); from = to) {
         double length = facets[held[from]].length;
         const auto goes_on = [&](std::size_t k) {
@@ -99,12 +87,37 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
             const double at = (way + 0.5 * f.length) / length * parts;
             way += f.length;
             const int before = std::min(static_cast<int>(at), parts - 1);
-            made->places_[held[k] - made->first_] = {stations + before, at - before};
-            around = {around.low.cwiseMin(f.position), around.high.cwiseMax(f.position)};
+            places_[held[k] - first_] = {stations_ + before, at - before};
         }
-        stations += parts + 1;
+        stations_ += parts + 1;
     }
+    return held;
+}
+
+// What the held facets bear of unit forces on the stations.
+std::vector<LocalYield::Load> LocalYield::loads(const std::vector<int>& held, const std::vector<Facet>& facets) const {
+    std::vector<double> lengths(stations_, 0.0);
+    std::vector<Load> found;
+    for (const int i : held)
+        for (const int next : {0, 1}) {
+            const double length = (next ? place(i).share : 1.0 - place(i).share) * facets[i].length;
+            lengths[place(i).station + next] += length;
+            if (length > 0.0) found.push_back({i, place(i).station + next, length * facets[i].normal});
+        }
+    for (Load& load : found) load.force /= lengths[load.station];
+    return found;
+}
+
+std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBody& rigid, const Scene& whole, const Plan& plan,
+                                              const MaterialMap& wood, const Discretisation& body) {
+    const Layout& layout = body.layout;
+    const std::vector<Facet>& facets = body.facets;
+    std::shared_ptr<LocalYield> made(new LocalYield);
+    const std::vector<int> held = made->place_stations(where, facets, layout.cell.minCoeff() / finer);
+    if (held.empty()) return nullptr;
     // The box, along the grid's lines.
+    Box around{facets[held.front()].position, facets[held.front()].position};
+    for (const int i : held) around = {around.low.cwiseMin(facets[i].position), around.high.cwiseMax(facets[i].position)};
     const Vec2 cells(layout.cells_x, layout.cells_y);
     const Vec2 low = (around.low.cwiseQuotient(layout.cell).array() - margin).floor().max(0.0);
     const Vec2 high = (around.high.cwiseQuotient(layout.cell).array() + margin).ceil().min(cells.array());
@@ -114,57 +127,55 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
     made->fine_ = std::make_shared<Solved>(whole, plan, wood, box, cell / finer);
     if (!made->coarse_->equilibrium || !made->fine_->equilibrium) return nullptr;
 
-    // Loads: each facet's share of a station, held by the grid as the wheel's facets are, and on fine cells alone.
-    std::vector<double> shares(stations, 0.0);
-    for (const int i : held) {
-        const Place& place = made->place(i);
-        shares[place.station] += (1.0 - place.share) * facets[i].length;
-        shares[place.station + 1] += place.share * facets[i].length;
-    }
+    // Loads are held by the grid as the wheel's facets are, and on fine cells alone.
     const Discretisation &coarse = made->coarse_->cut.body, &fine = made->fine_->cut.body;
     std::vector<Eigen::Triplet<double>> on_coarse, on_fine;
-    for (const int i : held) {
-        const Place& place = made->place(i);
-        const Facet& facet = facets[i];
-        const Vec2 x = facet.position - box.low;
-        const auto nearest = std::min_element(fine.facets.begin(), fine.facets.end(), [&](const Facet& a, const Facet& b) {
-            return (a.position - x).squaredNorm() < (b.position - x).squaredNorm();
-        });
-        const auto fine_weight = fine.values_at(fine.points.cell[nearest->point], x);
-        for (const int next : {0, 1}) {
-            const int station = place.station + next;
-            const double share = (next ? place.share : 1.0 - place.share) * facet.length;
-            if (share == 0.0) continue;
-            const Vec2 force = share / shares[station] * facet.normal;
-            const auto add = [&](std::vector<Eigen::Triplet<double>>& loads, std::span<const int> fields, const auto& weight) {
-                for (int k = 0; k < 4; ++k)
-                    for (const int axis : {0, 1}) loads.emplace_back(2 * fields[k] + axis, station, weight[k] * force[axis]);
-            };
-            for (const SlidingBody::Hold& hold : rigid.holds(i)) {
-                const int c = body.points.cell[hold.point];
-                const int inner = coarse.layout.cell_index(c % layout.cells_x - static_cast<int>(low.x()),
-                                                           c / layout.cells_x - static_cast<int>(low.y()));
-                const int same = coarse.points.first_of_cell[inner] + hold.point - body.points.first_of_cell[c];
-                add(on_coarse, coarse.points.node[same], hold.weight);
-            }
-            add(on_fine, fine.points.node[nearest->point], fine_weight);
+    for (const Load& load : made->loads(held, facets)) {
+        const auto add = [&](std::vector<Eigen::Triplet<double>>& loads, std::span<const int> fields, const auto& weight) {
+            for (int k = 0; k < 4; ++k)
+                for (const int axis : {0, 1})
+                    loads.emplace_back(2 * fields[k] + axis, load.station, weight[k] * load.force[axis]);
+        };
+        for (const SlidingBody::Hold& hold : rigid.holds(load.facet)) {
+            const int c = body.points.cell[hold.point];
+            const int inner = coarse.layout.cell_index(c % layout.cells_x - static_cast<int>(low.x()),
+                                                       c / layout.cells_x - static_cast<int>(low.y()));
+            add(on_coarse, coarse.layout.cell_nodes(inner), hold.weight);
         }
+        const Vec2 x = facets[load.facet].position - box.low;
+        const auto distance = [&](const Facet& f) { return (f.position - x).squaredNorm(); };
+        const int point = std::ranges::min_element(fine.facets, {}, distance)->point;
+        add(on_fine, fine.points.node[point], fine.values_at(fine.points.cell[point], x));
     }
     for (const auto& [side, loads] : {std::pair{made->coarse_, &on_coarse}, {made->fine_, &on_fine}}) {
-        side->loads.resize(2 * side->fields(), stations);
+        side->loads.resize(2 * side->fields(), made->stations_);
         side->loads.setFromTriplets(loads->begin(), loads->end());
         if (!side->solve()) return nullptr;
     }
-    made->yield_ = made->fine_->compliance() - made->coarse_->compliance();
-    made->yield_ = (0.5 * (made->yield_ + made->yield_.transpose())).eval();
+    const Eigen::MatrixXd more = made->fine_->compliance() - made->coarse_->compliance();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(more);
+    made->modes_ = modes.eigenvectors();
+    made->mode_yield_ = modes.eigenvalues();
+    made->yield_ = made->modes_ * made->mode_yield_.cwiseMax(0.0).asDiagonal() * made->modes_.transpose();
     return made;
 }
 
+// A function f of a symmetric matrix A = V diag(a) V^T has the slope V (F o V^T A' V) V^T with F_ij = (f(a_i) - f(a_j)) / (a_i -
+// a_j), or f'(a_i) (Daleckii and Krein 1965).
 void LocalYield::find_slopes(const std::vector<MaterialSlope>& numbers) {
     if (slopes_.size() == numbers.size()) return;
-    slopes_.assign(numbers.size(), Eigen::MatrixXd::Zero(stations(), stations()));
+    slopes_.assign(numbers.size(), Eigen::MatrixXd::Zero(stations_, stations_));
     fine_->add_slopes(numbers, 1.0, slopes_);
     coarse_->add_slopes(numbers, -1.0, slopes_);
+    for (Eigen::MatrixXd& slope : slopes_) {
+        slope = modes_.transpose() * slope * modes_;
+        for (int i = 0; i < stations_; ++i)
+            for (int j = 0; j < stations_; ++j) {
+                const auto [low, high] = std::minmax(mode_yield_[i], mode_yield_[j]);
+                slope(i, j) *= low > 0.0 ? 1.0 : high > 0.0 ? high / (high - low) : 0.0;
+            }
+        slope = modes_ * slope * modes_.transpose();
+    }
 }
 
 // With s = A P^T N(d - P s) and K = N' the yields follow the depths d by (1 + A P^T K P)^-1 A P^T K.

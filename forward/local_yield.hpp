@@ -15,6 +15,8 @@ namespace crampfit {
 /// Small strain, without cracks.
 ///
 /// Loads and yields are those of stations along the outline, a fine cell apart, along its normal; linear from one to the next.
+/// Modes of the difference in which the grid yields more, as cells may that latewood cuts, are left out: less than nothing in
+/// series with the springs, the tangent would not be positive.
 class LocalYield {
   public:
     /// Of facets whose middles lie in `where`. Null where these are none, or nothing of the box would be held. `whole`, `plan`,
@@ -32,9 +34,9 @@ class LocalYield {
         return facet >= first_ && facet < first_ + static_cast<int>(places_.size()) && places_[facet - first_].station >= 0;
     }
     const Place& place(int facet) const { return places_[facet - first_]; }
-    int stations() const { return static_cast<int>(yield_.rows()); }
+    int stations() const { return stations_; }
 
-    /// Of stations to forces on them, beyond the grid's [m/N]; symmetric.
+    /// Of stations to forces on them, beyond the grid's [m/N]; symmetric, not negative.
     const Eigen::MatrixXd& yield() const { return yield_; }
 
     /// How the stations under a wheel answer to it.
@@ -58,11 +60,19 @@ class LocalYield {
 
   private:
     struct Solved;  // the box on one grid
+    struct Load {
+        int facet, station;
+        Vec2 force;  // [N]
+    };
     LocalYield() = default;
+    std::vector<int> place_stations(const Box& where, const std::vector<Facet>& facets, double pitch);
+    std::vector<Load> loads(const std::vector<int>& held, const std::vector<Facet>& facets) const;
     void find_slopes(const std::vector<MaterialSlope>& numbers);
 
-    int first_ = 0;
-    std::vector<Place> places_;  // by facet, from the first on; station -1: not held
+    int first_ = 0, stations_ = 0;
+    std::vector<Place> places_;   // by facet, from the first on; station -1: not held
+    Eigen::MatrixXd modes_;       // [stations x modes] of the difference of the yields
+    Eigen::VectorXd mode_yield_;  // [modes] [m/N]
     Eigen::MatrixXd yield_;
     std::vector<Eigen::MatrixXd> slopes_;  // [numbers] of the yield [m/N / unit]; empty: not asked for yet
     std::shared_ptr<Solved> coarse_, fine_;

@@ -14,13 +14,13 @@
 namespace crampfit::test {
 namespace {
 
-// A wheel of 0.5 mm radius comes down on 4 x 4 mm, held from below, at 1 m/s.
+// A wheel of 0.5 mm radius comes down on 3 x 3 mm, held from below, at 1 m/s.
 Scene rolled(double cell, double where) {
-    Scene scene = block({4e-3, 4e-3}, cell);
+    Scene scene = block({3e-3, 3e-3}, cell);
     scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
     Body wheel;
     wheel.name = "wheel";
-    wheel.shape = Circle{Vec2(where, 4.5e-3), 0.5e-3};
+    wheel.shape = Circle{Vec2(where, 3.5e-3), 0.5e-3};
     wheel.velocity = {0.0, -1.0};
     scene.bodies = {wheel};
     scene.measure = {"wheel", "wheel"};
@@ -41,7 +41,7 @@ Scene rolled_over_latewood(double cell, double where) {
 
 double force(const Scene& scene, double travel) {
     StaticTrial trial(scene);
-    const bool ok = trial.solve(travel); std::printf("cell %g travel %g ok %d\n", scene.model.cell, travel, (int)ok); EXPECT_TRUE(ok);
+    EXPECT_TRUE(trial.solve(travel));
     return -trial.equilibrium.reactions().back().y();
 }
 
@@ -51,7 +51,7 @@ TEST(VerificationLocalYield, WoodYieldsAsHertzHasItWithinACell) {
     // cell; here it is 0.5 to 1 of one.
     const double cell = 0.1e-3, modulus = 40e6 / (1 - 0.33 * 0.33);
     for (const double place : {0.0, 0.25, 0.5}) {
-        const Scene scene = rolled(cell, 2e-3 + place * cell);
+        const Scene scene = rolled(cell, 1.5e-3 + place * cell);
         const double low = 0.012e-3, high = 0.04e-3;
         const double at_low = force(scene, low), at_high = force(scene, high);
         const double half_width = std::sqrt(4 * at_high * 0.5e-3 / (std::numbers::pi * modulus));
@@ -65,7 +65,7 @@ TEST(VerificationLocalYield, WoodYieldsAsHertzHasItWithinACell) {
 TEST(VerificationLocalYield, OverAnEdgeOfLatewood) {
     // Against cells of 0.025 mm, a twentieth of the wheel's radius, of which it feels none.
     double worst = 0;
-    for (double where = 1.2e-3; where < 1.75e-3; where += 0.1e-3) {
+    for (double where = 1.2e-3; where < 1.75e-3; where += 0.25e-3) {
         const double travel = 0.03e-3;
         const double fine = force(rolled_over_latewood(0.025e-3, where), travel);
         const double error = force(rolled_over_latewood(0.1e-3, where), travel) / fine - 1;
