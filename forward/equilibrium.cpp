@@ -21,7 +21,7 @@ constexpr double face_stiffness_factor = 100.0;
 
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner
 // does not always come below 1e-9.
-constexpr double balance = 1e-7;
+constexpr double balance = 1e-8;
 // What is less than this part of the largest force out of balance is left over from the solution before: where all else is
 // nothing, as away from a tip that has grown, the factor's parts need not be asked.
 constexpr double rounding = 1e-11;
