@@ -1,5 +1,9 @@
 #include "forward/contact.hpp"
 
+#include "forward/local_yield.hpp"
+
+#include <Eigen/LU>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -47,6 +51,22 @@ bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, doubl
     depth = on.distance;
     out = on.normal;
     return true;
+}
+
+// Of a facet with its full stiffness k, so deep in a body.
+struct Press {
+    double force = 0.0, stiffness = 0.0, energy = 0.0;  // [N], [N/m], [J]
+};
+
+Press press(double k, double depth, double onset) {
+    if (depth <= 0.0) return {};
+    const double grows = 1.0 - at_touch;
+    if (depth < 2.0 * onset)
+        return {k * depth * (at_touch + grows * depth / (4.0 * onset)), k * (at_touch + grows * depth / (2.0 * onset)),
+                k * depth * depth * (at_touch / 2.0 + grows * depth / (12.0 * onset))};
+    const double d = depth - grows * onset;
+    const double at_end = 2.0 * at_touch + grows * 2.0 / 3.0 - 0.5 * (1.0 + at_touch) * (1.0 + at_touch);
+    return {k * d, k, 0.5 * k * d * d + at_end * k * onset * onset};
 }
 
 // How deep a place lies in the shape; below 0: that far outside [m].
@@ -228,28 +248,94 @@ double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
     return most;
 }
 
+void SlidingBody::let_yield(std::shared_ptr<LocalYield> yield) {
+    if (!yield) return;
+    yield_ = std::move(yield);
+    for (double& k : stiffness_) k *= LocalYield::finer;
+}
+
+double SlidingBody::sunk_at(int facet) const {
+    const LocalYield::Place& place = yield_->place(facet);
+    return (1.0 - place.share) * sunk_[place.station] + place.share * sunk_[place.station + 1];
+}
+
+// Finds how far s the wood yields beyond the grid: s = A P^T N(d - P s), with the depths d of the facets against the grid, their
+// forces N and their shares P of the stations. By Newton's method, with a part of its step where the whole one does no good.
+void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement) {
+    constexpr int most_iterations = 60, most_halvings = 8;
+    constexpr double tolerance_in_cells = 1e-12;
+    constexpr double reach_in_cells = 0.25;  // of facets that may touch: wood rises by far less beside what is pressed
+    const double cell = body_.layout.cell.minCoeff();
+    struct Met {
+        int station;
+        double share, stiffness, depth;
+    };
+    std::vector<Met> met;
+    std::vector<int> stations;
+    for (const int i : near_) {
+        if (!yield_->holds(i)) continue;
+        const double depth = signed_depth(shape_, current(i, displacement) - moved);
+        if (depth < -reach_in_cells * cell) continue;
+        const LocalYield::Place& place = yield_->place(i);
+        met.push_back({place.station, place.share, stiffness_[i], depth});
+        stations.insert(stations.end(), {place.station, place.station + 1});
+    }
+    std::ranges::sort(stations);
+    stations.erase(std::ranges::unique(stations).begin(), stations.end());
+    for (Met& m : met) m.station = static_cast<int>(std::ranges::lower_bound(stations, m.station) - stations.begin());
+    const auto count = static_cast<Eigen::Index>(stations.size());
+    const Eigen::MatrixXd yield = yield_->yield()(stations, stations);
+    Eigen::VectorXd sunk = Eigen::VectorXd::Zero(count), force(count);
+    Eigen::MatrixXd springs(count, count);
+    const auto residual = [&](const Eigen::VectorXd& s) -> Eigen::VectorXd {
+        force.setZero();
+        springs.setZero();
+        for (const Met& m : met) {
+            const int at = m.station;
+            const Eigen::Vector2d share(1.0 - m.share, m.share);
+            const Press pressed = press(m.stiffness, m.depth - share.dot(s.segment<2>(at)), onset_in_cells * cell);
+            force.segment<2>(at) += pressed.force * share;
+            springs.block<2, 2>(at, at) += pressed.stiffness * share * share.transpose();
+        }
+        return s - yield * force;
+    };
+    Eigen::VectorXd off = residual(sunk);
+    const auto is_off = [&] { return count > 0 && off.cwiseAbs().maxCoeff() > tolerance_in_cells * cell; };
+    for (int iteration = 0; iteration < most_iterations && is_off(); ++iteration) {
+        const Eigen::VectorXd step = -(Eigen::MatrixXd::Identity(count, count) + yield * springs).partialPivLu().solve(off);
+        const double before = off.norm();
+        double share = 1.0;
+        off = residual(sunk + step);
+        for (int k = 0; k < most_halvings && off.norm() >= before; ++k) off = residual(sunk + (share *= 0.5) * step);
+        sunk += share * step;
+    }
+    yield_energy_ = 0.5 * force.dot(sunk);
+    sunk_ = Eigen::VectorXd::Zero(yield_->stations());
+    sunk_(stations) = sunk;
+}
+
 std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {
     if (age_++ % steps_between_searches_ == 0) find_near(moved, displacement);
     const double onset = onset_in_cells * body_.layout.cell.minCoeff();
+    if (yield_) sink(moved, displacement);
     std::vector<Touch> found;
     for (const int i : near_) {
         Touch touch{i, Vec2::Zero(), 0.0, 0.0, 0.0, 0.0, {}};
         double depth = 0.0;
         const Vec2 x = current(i, displacement) - moved;
-        if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) continue;
-        const double k = stiffness_[i];
-        if (depth < 2.0 * onset) {
-            const double grows = 1.0 - at_touch;
-            touch.force = k * depth * (at_touch + grows * depth / (4.0 * onset));
-            touch.stiffness = k * (at_touch + grows * depth / (2.0 * onset));
-            touch.energy = k * depth * depth * (at_touch / 2.0 + grows * depth / (12.0 * onset));
-        } else {
-            const double d = depth - (1.0 - at_touch) * onset;
-            touch.force = k * d;
-            touch.stiffness = k;
-            const double at_end = 2.0 * at_touch + (1.0 - at_touch) * 2.0 / 3.0 - 0.5 * (1.0 + at_touch) * (1.0 + at_touch);
-            touch.energy = 0.5 * k * d * d + at_end * k * onset * onset;
+        if (yield_ && yield_->holds(i)) {
+            const Vec2 arm = x - std::get<Circle>(shape_).centre;
+            depth = std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i);
+            touch.normal = arm.normalized();
+            touch.curvature = 1.0 / arm.norm();
+        } else if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) {
+            continue;
         }
+        const Press pressed = press(stiffness_[i], depth, onset);
+        if (pressed.force <= 0.0) continue;
+        touch.force = pressed.force;
+        touch.stiffness = pressed.stiffness;
+        touch.energy = pressed.energy;
         if (friction_ > 0.0) touch.drag = drag_on(touch, x, depth);
         found.push_back(touch);
     }
@@ -258,9 +344,9 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
 
 Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
     Vec2 total = Vec2::Zero();
-    stored_energy_ = 0.0;
     sliding_now_ = 0.0;
     pushed_ = touches(moved, displacement);
+    stored_energy_ = yield_energy_;
     for (const Touch& touch : pushed_) {
         const Vec2 push = touch.force * touch.normal + touch.drag.force;
         for (const Hold& hold : holds(touch.facet))

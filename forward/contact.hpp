@@ -4,10 +4,13 @@
 #include "forward/friction.hpp"
 
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
 namespace crampfit {
+
+class LocalYield;
 
 /// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
 /// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each
@@ -24,6 +27,13 @@ class SlidingBody {
     /// Softens the springs so that they add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields
     /// of these masses [kg]. From then on the facets that the body may touch are searched for now and then only.
     void limit_frequency(const std::vector<double>& mass, double most_frequency_squared);
+
+    /// From now on the wood yields by so much more than the grid, with springs as stiff for the finer cells that say so. Of
+    /// circles alone.
+    void let_yield(std::shared_ptr<LocalYield> yield);
+    LocalYield* yield() const { return yield_.get(); }  // null: it does not
+    bool is_round() const { return width_ > 0.0; }      // and no more than some cells across
+    const Shape& shape() const { return shape_; }
 
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].
     Vec2 push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
@@ -70,6 +80,8 @@ class SlidingBody {
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
     bool find_joints(int first, int last);
     void find_holds();
+    void sink(const Vec2& moved, const std::vector<Vec2>& displacement);
+    double sunk_at(int facet) const;
     Vec2 current(int facet, const std::vector<Vec2>& displacement) const;
 
     Shape shape_;
@@ -83,6 +95,11 @@ class SlidingBody {
     int age_ = 0;
     int steps_between_searches_ = 1;
     double stored_energy_ = 0.0;
+
+    // Of wood that yields by more than the grid:
+    std::shared_ptr<LocalYield> yield_;
+    Eigen::VectorXd sunk_;       // [stations] by how much more, at the last touches [m]
+    double yield_energy_ = 0.0;  // that this took [J]
 
     // Friction:
     double friction_;            // coefficient; 0: none, and nothing below is there

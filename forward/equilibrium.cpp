@@ -1,6 +1,7 @@
 #include "forward/equilibrium.hpp"
 
 #include "forward/deformation.hpp"
+#include "forward/local_yield.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +21,7 @@ constexpr double face_stiffness_factor = 100.0;
 
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner
 // does not always come below 1e-9.
-constexpr double balance = 1e-7;
+constexpr double balance = 1e-8;
 // What is less than this part of the largest force out of balance is left over from the solution before: where all else is
 // nothing, as away from a tip that has grown, the factor's parts need not be asked.
 constexpr double rounding = 1e-11;
@@ -56,6 +57,7 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
+        let_yield(sliding_.back(), boundary_.travel(sliding_driver_.back(), std::min(plan.end_time, plan.still_from)));
     }
     displacement_.assign(cracks_.fields(), Vec2::Zero());
     double stiffest = 0.0;
@@ -261,8 +263,9 @@ void Equilibrium::add_lone_points() {
 void Equilibrium::add_touches(bool geometric) {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        for (const SlidingBody::Touch& touch : sliding_[i].touches(place_of(driver), displacement_))
-            add_touch(sliding_[i], driver, touch, geometric);
+        const std::vector<SlidingBody::Touch> touches = sliding_[i].touches(place_of(driver), displacement_);
+        for (const SlidingBody::Touch& touch : touches) add_touch(sliding_[i], driver, touch, geometric);
+        if (sliding_[i].yield()) add_yield(sliding_[i], driver, touches);
     }
 }
 

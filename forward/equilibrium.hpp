@@ -73,6 +73,9 @@ class Equilibrium {
     /// The motion that this load on the points and facets would bring about [N].
     Motion yield_to(const std::vector<Vec2>& load) const;
 
+    /// The displacements that such loads would bring about, both [2 x fields, any number].
+    Eigen::MatrixXd yields_to(Eigen::MatrixXd loads) const;
+
     /// Derivatives by numbers of the materials at this equilibrium.
     struct Slopes {
         Eigen::VectorXd potential;  // [numbers] [J / unit]
@@ -139,6 +142,8 @@ class Equilibrium {
     void add_touches(bool geometric);
     void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
     void add_touch(const SlidingBody& body, int driver, const SlidingBody::Touch& touch, bool geometric);
+    void let_yield(SlidingBody& body, const Vec2& travel);
+    void add_yield(const SlidingBody& body, int driver, const std::vector<SlidingBody::Touch>& touches);
     void add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder);
     bool take_in_spread();
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);

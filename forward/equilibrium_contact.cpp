@@ -1,6 +1,7 @@
 // Of equilibrium, what bodies that follow a force and friction add to it.
 #include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
+#include "forward/local_yield.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
@@ -209,6 +210,52 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
     for (std::size_t a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
     rows.resize(size);
     spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size)});
+}
+
+// Wheels that a few cells go round feel what the grid misses of the wood's yield, where it is known before what they may touch.
+void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
+    constexpr double margin = 3.0;  // of the way [cells]
+    if (!rigid.is_round() || plan_.friction || plan_.remembers || plan_.free_bodies || !travel.allFinite()) return;
+    const Box at_start = bounds(rigid.shape());
+    const Vec2 more = margin * body_.layout.cell;
+    const Box way{at_start.low.cwiseMin(at_start.low + travel) - more, at_start.high.cwiseMax(at_start.high + travel) + more};
+    rigid.let_yield(LocalYield::about(way, rigid, scene_, plan_, materials_, body_));
+}
+
+// What the yield of stations beyond the grid's takes off the springs' stiffness K: K P gives P^T K (LocalYield::pressed).
+void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vector<SlidingBody::Touch>& touches) {
+    const LocalYield::Pressed pressed = rigid.yield()->pressed(touches);
+    if (pressed.stations.empty()) return;
+    const Points& points = body_.points;
+    std::vector<int> fields;
+    for (const SlidingBody::Touch& touch : touches)
+        for (const SlidingBody::Hold& hold : rigid.holds(touch.facet))
+            fields.insert(fields.end(), points.node[hold.point].begin(), points.node[hold.point].end());
+    std::ranges::sort(fields);
+    fields.erase(std::ranges::unique(fields).begin(), fields.end());
+    const auto size = static_cast<Eigen::Index>(2 * fields.size());
+    Eigen::MatrixXd push = Eigen::MatrixXd::Zero(size + 2, touches.size());  // on fields and the body, of a unit force
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+        for (const SlidingBody::Hold& hold : rigid.holds(touches[i].facet))
+            for (int k = 0; k < 4; ++k) {
+                const auto at = std::ranges::lower_bound(fields, points.node[hold.point][k]) - fields.begin();
+                push.col(i).segment<2>(2 * at) += hold.weight[k] * touches[i].normal;
+            }
+        push.col(i).tail<2>() -= touches[i].normal;
+    }
+    const Eigen::MatrixXd pull = push * pressed.stiffness.asDiagonal() * pressed.share;
+    const Eigen::MatrixXd change = -pull * pressed.gives * pull.transpose();
+    std::vector<int> rows(size + 2);
+    std::vector<double> steps(size + 2);
+    for (Eigen::Index a = 0; a < size + 2; ++a) {
+        const int axis = static_cast<int>(a % 2), dof = a < size ? 2 * fields[a / 2] + axis : -1;
+        rows[a] = dof < 0 ? row_of_body(driver, axis) : row_of(dof);
+        steps[a] = dof < 0 ? still_to_go_[driver][axis] : prescribed_step_[dof];
+    }
+    couple(rows, steps, change);
+    for (Eigen::Index a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
+    rows.resize(size);
+    spread_.push_back({std::move(rows), change.topLeftCorner(size, size)});
 }
 
 // Into the factor.

@@ -1,5 +1,6 @@
 #include "forward/deformation.hpp"
 #include "forward/equilibrium.hpp"
+#include "forward/local_yield.hpp"
 
 #include <algorithm>
 
@@ -49,12 +50,23 @@ std::vector<Equilibrium::Motion> Equilibrium::motions(const std::vector<std::vec
     return found;
 }
 
-Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
-    Eigen::MatrixXd step = Eigen::VectorXd::Zero(equations_);
+Eigen::MatrixXd Equilibrium::yields_to(Eigen::MatrixXd loads) const {
+    Eigen::MatrixXd step(equations_, loads.cols());
     for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) step(equation_[dof]) = load[dof / 2][dof % 2];
+        if (equation_[dof] >= 0) step.row(equation_[dof]) = loads.row(dof);
     factor_.solve(step);
-    return motion_of(std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), step);
+    loads.setZero();
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) loads.row(dof) = step.row(equation_[dof]);
+    return loads;
+}
+
+Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
+    Motion motion{std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), load};
+    const auto components = static_cast<Eigen::Index>(2 * load.size());
+    const Eigen::VectorXd fields = yields_to(Eigen::Map<const Eigen::VectorXd>(load.data()->data(), components));
+    Eigen::Map<Eigen::VectorXd>(motion.fields.data()->data(), components) = fields;
+    return motion;
 }
 
 double Equilibrium::Slopes::along(const Motion& motion, int number) const {
@@ -122,17 +134,27 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     }
     // So are bodies' springs.
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
-        for (const SlidingBody::Touch& touch : sliding_[s].touches(place_of(sliding_driver_[s]), displacement_)) {
-            const Facet& facet = body_.facets[touch.facet];
-            const auto& constants = points.stiffness[points.cell[facet.point]];
-            const int stiffest = constants[0] >= constants[2] ? 0 : 1;
-            for (std::size_t n = 0; n < numbers.size(); ++n) {
+        const std::vector<SlidingBody::Touch> touches = sliding_[s].touches(place_of(sliding_driver_[s]), displacement_);
+        for (std::size_t n = 0; n < numbers.size(); ++n) {
+            Eigen::VectorXd forces(touches.size());
+            for (std::size_t k = 0; k < touches.size(); ++k) {
+                const Facet& facet = body_.facets[touches[k].facet];
+                const auto& constants = points.stiffness[points.cell[facet.point]];
+                const int stiffest = constants[0] >= constants[2] ? 0 : 1;
                 const double stiffer =
                     numbers[n].stiffness(points.cell[facet.point])(stiffest, stiffest) / points.stiffest(facet.point);
-                slope.potential[n] += stiffer * touch.energy;
-                const Vec2 push = stiffer * touch.force * touch.normal;
-                for (const SlidingBody::Hold& hold : sliding_[s].holds(touch.facet))
-                    for (int k = 0; k < 4; ++k) add(n, points.node[hold.point][k], -hold.weight[k] * push);
+                slope.potential[n] += stiffer * touches[k].energy;
+                forces[k] = stiffer * touches[k].force;
+            }
+            if (LocalYield* yield = sliding_[s].yield()) {
+                LocalYield::Slope more = yield->slope(touches, std::move(forces), numbers, n);
+                slope.potential[n] += more.energy;
+                forces = std::move(more.forces);
+            }
+            for (std::size_t k = 0; k < touches.size(); ++k) {
+                const Vec2 push = forces[k] * touches[k].normal;
+                for (const SlidingBody::Hold& hold : sliding_[s].holds(touches[k].facet))
+                    for (int m = 0; m < 4; ++m) add(n, points.node[hold.point][m], -hold.weight[m] * push);
                 slope.drivers.col(n).segment<2>(2 * sliding_driver_[s]) += push;
             }
         }
@@ -141,14 +163,10 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
 }
 
 std::vector<std::vector<Vec2>> Equilibrium::displacement_slopes(const Slopes& slopes) const {
-    const auto numbers = slopes.fields.cols();
-    Eigen::MatrixXd step = Eigen::MatrixXd::Zero(equations_, numbers);
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) step.row(equation_[dof]) = -slopes.fields.row(dof);
-    factor_.solve(step);
-    std::vector<std::vector<Vec2>> found(numbers, std::vector<Vec2>(displacement_.size(), Vec2::Zero()));
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        for (int n = 0; n < numbers && equation_[dof] >= 0; ++n) found[n][dof / 2][dof % 2] = step(equation_[dof], n);
+    const Eigen::MatrixXd yields = yields_to(-slopes.fields);
+    std::vector<std::vector<Vec2>> found(yields.cols(), std::vector<Vec2>(displacement_.size()));
+    for (Eigen::Index n = 0; n < yields.cols(); ++n)
+        for (std::size_t f = 0; f < displacement_.size(); ++f) found[n][f] = yields.col(n).segment<2>(2 * f);
     return found;
 }
 
