@@ -82,10 +82,11 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
     const CrackTip& tip = line.tip(growing.at_end);
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
     const double way = 0.25 * quarters * growing.increment;
-    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (1.0 - 1e-6) * body_.layout.cell.maxCoeff())
+    const double cell = body_.layout.cell.maxCoeff();
+    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (1.0 - 1e-6) * cell)
         return tip.position + way * tip.direction;
     const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
-    return tip.position + way * growth_direction(criterion, tip, load, materials_, growing.increment);
+    return tip.position + way * growth_direction(criterion, tip, load, materials_, std::max(growing.increment, cell));
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
