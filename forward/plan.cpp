@@ -396,6 +396,12 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                "given in specimen.parts");
     choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
+    const bool round = std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) {
+        return b.contact.kind != Contact::Kind::bonded && std::holds_alternative<Circle>(b.shape);
+    });
+    if (plan.quasistatic && round && !plan.friction && !plan.remembers && !plan.free_bodies)
+        choose("wood under wheels", "boxes with finer cells along their ways",
+               "a wheel touches a few cells, which yield less than the wood does");
     if (plan.friction)
         choose("friction", "Coulomb, of bodies or crack faces that press",
                plan.quasistatic ? "slip counts from one equilibrium to the next; Newton's method takes its unsymmetric tangent "
