@@ -78,11 +78,15 @@ double signed_depth(const Shape& shape, const Vec2& x) {
 
 }  // namespace
 
+bool is_small_circle(const Shape& shape, const Layout& layout) {
+    const auto* circle = std::get_if<Circle>(&shape);
+    return circle && circle->radius <= most_radius_in_cells * layout.cell.maxCoeff();
+}
+
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
     : shape_(shape), body_(body), friction_(friction) {
-    const double cell = body.layout.cell.maxCoeff();
-    if (const auto* circle = std::get_if<Circle>(&shape); circle && circle->radius <= most_radius_in_cells * cell)
-        width_ = std::min(width_in_cells * cell, width_in_radii * circle->radius);
+    if (is_small_circle(shape, body.layout))
+        width_ = std::min(width_in_cells * body.layout.cell.maxCoeff(), width_in_radii * std::get<Circle>(shape).radius);
     goes_on_.resize(body.facets.size(), false);
     find_joints(0, static_cast<int>(body.facets.size()) - 1);
     find_holds();

@@ -12,6 +12,9 @@ namespace crampfit {
 
 class LocalYield;
 
+/// Whether a body is a circle that no more than some cells go round, which feels each of the grid's bends.
+bool is_small_circle(const Shape& shape, const Layout& layout);
+
 /// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
 /// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each
 /// facet that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
@@ -32,7 +35,6 @@ class SlidingBody {
     /// circles alone.
     void let_yield(std::shared_ptr<LocalYield> yield);
     LocalYield* yield() const { return yield_.get(); }  // null: it does not
-    bool is_round() const { return width_ > 0.0; }      // and no more than some cells across
     const Shape& shape() const { return shape_; }
 
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].

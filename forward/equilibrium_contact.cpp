@@ -215,7 +215,7 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
 // Wheels that a few cells go round feel what the grid misses of the wood's yield, where it is known before what they may touch.
 void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
     constexpr double margin = 3.0;  // of the way [cells]
-    if (!rigid.is_round() || plan_.friction || plan_.remembers || plan_.free_bodies || !travel.allFinite()) return;
+    if (!plan_.finer_at_wheels || !is_small_circle(rigid.shape(), body_.layout)) return;
     const Box at_start = bounds(rigid.shape());
     const Vec2 more = margin * body_.layout.cell;
     const Box way{at_start.low.cwiseMin(at_start.low + travel) - more, at_start.high.cwiseMax(at_start.high + travel) + more};

@@ -17,7 +17,7 @@ constexpr double margin = 6.0;                // of the box about the facets, in
 constexpr Eigen::Index solved_together = 32;  // loads
 
 Plan of_box(Plan plan) {
-    plan.rotates = plan.friction = plan.contact = plan.remembers = plan.free_bodies = false;
+    plan.rotates = plan.friction = plan.contact = plan.remembers = plan.free_bodies = plan.finer_at_wheels = false;
     plan.linear = true;
     return plan;
 }

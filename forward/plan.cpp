@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 #include "forward/bridging.hpp"
 #include "forward/bridging_check.hpp"
+#include "forward/contact.hpp"
 #include "forward/history.hpp"
 #include "forward/march.hpp"
 #include "forward/memory_check.hpp"
@@ -300,6 +301,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const double motion = farthest_motion(scene, plan.end_time);
     plan.contact = std::any_of(scene.bodies.begin(), scene.bodies.end(),
                                [](const Body& b) { return b.contact.kind != Contact::Kind::bonded; });
+    plan.finer_at_wheels = !plan.friction && !plan.remembers && !plan.free_bodies &&
+                           std::isfinite(std::min(plan.end_time, plan.still_from)) &&
+                           std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const Body& b) {
+                               return b.contact.kind != Contact::Kind::bonded && is_small_circle(b.shape, body.layout);
+                           });
     // A crack under edges that are drawn apart crosses before they go much farther than it takes to split a plain strip.
     const double needed = plan.quasistatic && plan.grows && scene.bodies.empty() ? splitting_motion(scene, body) : motion;
     const double expected = std::min(motion, needed);
@@ -396,10 +402,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                "given in specimen.parts");
     choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
-    const bool round = std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const Body& b) {
-        return b.contact.kind != Contact::Kind::bonded && std::holds_alternative<Circle>(b.shape);
-    });
-    if (plan.quasistatic && round && !plan.friction && !plan.remembers && !plan.free_bodies)
+    if (plan.quasistatic && plan.finer_at_wheels)
         choose("wood under wheels", "boxes with finer cells along their ways",
                "a wheel touches a few cells, which yield less than the wood does");
     if (plan.friction)

@@ -20,6 +20,7 @@ struct Plan {
     bool friction = false;               // some body or closed crack faces rub: a state hangs on the way to it
     bool remembers = false;              // some wood is viscoelastic or plastic: a state hangs on the way to it
     bool free_bodies = false;            // some body follows a force
+    bool finer_at_wheels = false;        // at equilibrium wheels feel wood on finer cells than the grid's
     double time_step = 0;                // [s]
     double added_frequency_squared = 0;  // what contact and ties may add to the highest squared frequency [1/s^2]
     double end_time = 0;                 // when a stop condition on time or displacement is met [s]; infinite: none is
