@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <sys/wait.h>
@@ -26,6 +27,7 @@ class Command {
 
     /// Starts it and returns; `finish` must follow.
     void start(const std::vector<std::string>& arguments) {
+        std::fflush(nullptr);  // or the new process writes out once more what this one has printed
         process_ = ::fork();
         if (process_ != 0) return;
         std::vector<char*> words{const_cast<char*>(COMMAND)};

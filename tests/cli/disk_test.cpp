@@ -1,5 +1,6 @@
 // Specimens cut from the photograph of a disk: segmented by the command, then split across and along the rings.
 #include "datasets/io.hpp"
+#include "forward/geometry.hpp"
 #include "tests/cli/command.hpp"
 
 #include <fmt/format.h>
@@ -70,9 +71,8 @@ displacement = "1.5 mm"
 double apart(const Vec2& x, const std::vector<Vec2>& way) {
     double nearest = INFINITY;
     for (std::size_t k = 0; k + 1 < way.size(); ++k) {
-        const Vec2 along = way[k + 1] - way[k];
-        const double share = std::clamp((x - way[k]).dot(along) / along.squaredNorm(), 0.0, 1.0);
-        nearest = std::min(nearest, (x - way[k] - share * along).norm());
+        const double share = nearest_on_segment(way[k], way[k + 1], x);
+        nearest = std::min(nearest, (x - way[k] - share * (way[k + 1] - way[k])).norm());
     }
     return nearest;
 }
@@ -80,7 +80,8 @@ double apart(const Vec2& x, const std::vector<Vec2>& way) {
 // Each crack goes through, and cells half as wide show the same way.
 TEST(SlowDisk, ScenesCutFromItSplit) {
     const auto image = std::filesystem::path(SHARED_DATA) / "wood" / "urudendro_f02c_crop.png";
-    if (!std::filesystem::exists(image)) GTEST_SKIP() << "there is no " << image;
+    if (!std::filesystem::exists(image))
+        GTEST_SKIP() << "there is no " << image;  // photographs are read beside the project, not part of it
     Command command;
     const Outcome found = command.run({"segment", image.string(), "-o", command.path("disk.h5"), "--pixel", "50 um"});
     ASSERT_EQ(found.status, 0) << found.error;

@@ -391,6 +391,33 @@ TEST(VerificationPath, StaysInModeI) {
     check_path(GrowthDirection::energy_release_rate, "energy release rate");
 }
 
+// Why a crack that K steers goes straight for a cell between turns: at the end of a short branch, 40 cells to the half crack, K
+// is that of Amestoy and Leblond (1992) once the branch is a cell long, and far off before.
+TEST(VerificationPath, ABranchIsSeenOnceItIsACellLong) {
+    const double cells = 40.0;
+    for (const double turn : {20.0, 40.0}) {
+        const Vec2 exact = branch_intensities(turn * degree, 1.0, 0.0);
+        const auto off = [&](double leg) {
+            SlantedCrack plate;
+            plate.cells = cells;
+            plate.remote << 0, 0, 0, 1e5;
+            plate.offset = {0.3, 0.4};
+            Scene scene = slanted_crack(plate);
+            const Vec2 way(std::cos(turn * degree), std::sin(turn * degree));
+            scene.cracks[0].points.push_back(scene.cracks[0].points.back() + leg * plate.half_length / cells * way);
+            const AtRest run(scene);
+            EXPECT_TRUE(run.solved());
+            const TipLoad load = run.load();
+            const Vec2 K = Vec2(load.K_I, load.K_II) / (1e5 * std::sqrt(std::numbers::pi * plate.half_length));
+            std::printf("turned by %.0f degrees, %.2f cells ago: K_I %.3f, K_II %.3f of K_0, exact %.3f, %.3f\n", turn, leg, K[0],
+                        K[1], exact[0], exact[1]);
+            return std::abs(K[1] - exact[1]);
+        };
+        const double half = off(0.5), whole = off(1.0);
+        EXPECT_LT(whole, 0.5 * half);
+    }
+}
+
 // Pulled across, a crack at 37 degrees kinks once and goes on without a corner (Amestoy and Leblond 1992: the turn after a kink
 // goes with the root of the way). The grid must not see its own kink as a load that turns it back. `most` [degrees] from leg to
 // leg.
