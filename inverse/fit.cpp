@@ -1,7 +1,6 @@
 #include "inverse/fit.hpp"
 
 #include "datasets/error.hpp"
-#include "datasets/run_journal.hpp"
 #include "inverse/close_look.hpp"
 #include "inverse/curve_distance.hpp"
 #include "inverse/differences.hpp"
@@ -11,10 +10,12 @@
 #include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
 #include "inverse/search.hpp"
+#include "inverse/study_check.hpp"
 #include "inverse/study_model.hpp"
+#include "inverse/study_runs.hpp"
 #include "inverse/uncertainty.hpp"
-#include "inverse/walk_descent.hpp"
 #include "inverse/walk_slopes.hpp"
+#include "inverse/wide_search.hpp"
 
 #include <fmt/format.h>
 
@@ -24,15 +25,12 @@
 #include <future>
 #include <limits>
 #include <mutex>
-#include <numeric>
 #include <optional>
 
 namespace crampfit {
 namespace {
 
 constexpr double bound_tolerance = 1e-4;  // of the box
-constexpr int most_weighings = 4;         // by another resolution of the model
-constexpr int most_cheap_runs = 1000000;  // of those that take milliseconds
 
 using Clock = std::chrono::steady_clock;
 
@@ -49,6 +47,16 @@ class Reporter {
     void set_stage(const std::string& stage) {
         const std::lock_guard lock(mutex_);
         progress_.stage = stage;
+    }
+
+    // After a run that is none of the fit's own.
+    void look() {
+        const std::lock_guard lock(mutex_);
+        progress_.seconds = seconds_since(begin_);
+        progress_.failure.clear();
+        if (options_.progress) {
+            options_.progress(progress_);
+        }
     }
 
     void add(const Run& run) {
@@ -131,19 +139,6 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
                                             : "No run ended well; the first: " + objective.runs().front().evaluation->status;
 }
 
-// All that the lowest point of a cheap model hangs on beyond what the runs do.
-std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
-                            double resolution, unsigned seed) {
-    Fingerprint print;
-    print.add(point).add(resolution).add(rough).add(seed).add(static_cast<double>(study.optimizer.loss));
-    print.add(std::vector<double>(window.origin.begin(), window.origin.end()));
-    print.add(std::vector<double>(window.axes.reshaped().begin(), window.axes.reshaped().end()));
-    for (const Parameter& parameter : study.parameters) {
-        print.add(parameter.lower).add(parameter.upper).add(static_cast<double>(parameter.scale));
-    }
-    return print.value();
-}
-
 const char* explain(FitStatus status) {
     switch (status) {
     case FitStatus::converged:
@@ -170,96 +165,26 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
+    check_study(study);
     const int threads = thread_count(options.threads);
-    const KeptWalks walks(study, std::max(1, threads / std::max(1, static_cast<int>(study.experiments.size()))));
-    const bool only_toughness = own && walks.only_toughness();
-    const bool by_walks = own && study.optimizer.method == "auto" && (only_toughness || walks.has_slopes());
-    // The same bits for any number of threads: runs that go on from one another are made one after the other.
-    const bool on_walks = by_walks || only_toughness;
-    const bool in_order = on_walks && walks.depend_on_order();
-    const Forward forward = !own ? options.forward : on_walks ? walks.exact() : walks.in_any_order();
-    StudyModel model(study, forward, own ? solver_resolution : 0.0, options.stop_requested);
-    const auto by_walk_of = [&](Forward (KeptWalks::*runs)(const std::vector<double>&) const) -> Near {
-        return [&, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
-            const Eigen::VectorXd values = model.box().values(point);
-            auto close = std::make_shared<StudyModel>(study, (walks.*runs)({values.begin(), values.end()}), model.resolution(),
-                                                      options.stop_requested);
-            return [=](const Eigen::VectorXd& x, int share) { return close->evaluate(x, in_order ? threads : share); };
-        };
-    };
-    const UnitBox& box = model.box();
-    Reporter reporter(options, study, box);
     RunStore store(options.keeping, study, options.stop_requested);
-    const auto of_point = [&](const Eigen::VectorXd& x) {
-        const Eigen::VectorXd values = box.values(x);
-        return std::vector<double>(values.begin(), values.end());
-    };
-    // What an earlier process has done on walks that hang on one another is done again only where something goes on from them.
-    std::size_t searches = 0;
-    const auto recall = [&](const Eigen::VectorXd& point, const Window& window, bool rough,
-                            const std::function<Lowest()>& search) {
-        const std::size_t n = searches++;
-        const std::uint64_t asked = what_is_asked(study, of_point(point), window, rough, model.resolution(), options.seed);
-        if (const auto before = store.found_by_search(n, asked)) {
-            if (in_order) {
-                walks.put_off(of_point(point), search);
-            }
-            return Lowest{Eigen::Map<const Eigen::VectorXd>(before->data(), box.size()), before->back()};
-        }
-        walks.catch_up(of_point(point));
-        const Lowest found = search();
-        std::vector<double> kept(found.x.begin(), found.x.end());
-        kept.push_back(found.misfit);
-        store.keep_search(n, asked, kept);
-        return found;
-    };
-    const Nearby nearby{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks.exact_near(),
-                        walks.turn_with_toughness(), recall};
-    // Steps on walks go on from the one before, where the walks are.
-    Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); },
-                   threads, by_walks || in_order ? nullptr : options.farm);
-    Objective objective(
-        box.size(),
-        [&](const Eigen::VectorXd& x, int share) {
-            const Eigen::VectorXd values = box.values(x);
-            const auto run = [&shared, values, share] { return shared(values, share); };
-            if (in_order && store.known(values)) {
-                walks.put_off(of_point(x), run);
-            } else if (in_order) {
-                walks.catch_up(of_point(x));
-            }
-            Evaluation evaluation = store.at(values, run);
-            model.weigh(evaluation, values);  // stored ones may have been weighed by another resolution
-            return evaluation;
-        },
-        study.optimizer.max_runs, in_order ? 1 : shared.places(), options.stop_requested,
-        [&](const Run& run) { reporter.add(run); });
+    const UnitBox box(study.parameters);
+    Reporter reporter(options, study, box);
+    StudyRuns runs(study, options, store, 1.0, [&](const Run& run) { reporter.add(run); });
+    const bool by_walks = runs.by_walks(), only_toughness = runs.only_toughness();
+    const StudyModel& model = runs.model();
+    Objective& objective = runs.objective();
 
     // The differences that the intervals rest on are part of the budget, and must not be eaten up by the search.
     const int reserve = std::min(static_cast<int>(2 * box.size()), study.optimizer.max_runs / 3);
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
-    // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
-    const std::vector<int> lengths = model.curve_lengths();
-    const double enough = nearby.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
-    SearchResult found =
-        by_walks ? descend_by_walks(objective, nearby, study.optimizer.starts, enough, box.initial(), options.seed, stage)
-                 : search(objective, study.optimizer, box.initial(), options.seed, stage);
-    for (int round = 0; by_walks && found.converged && round < most_weighings; ++round) {
-        // How well the model knows what it says shows where it fits.
-        const double likely = model.likely_resolution(*objective.best()->evaluation, solver_resolution);
-        const bool ended_early = round == 0 && enough > 0;
-        if (!ended_early && model.change_of_sigma(likely) <= 0.1) {
-            break;
-        }
-        model.set_resolution(likely);
-        objective.judge_anew([&](const Run& run) {
-            Evaluation evaluation = *run.evaluation;
-            model.weigh(evaluation, box.values(run.x));
-            return evaluation;
-        });
-        found.converged = descend_again(objective, nearby, options.seed);
-    }
+    WideSearch before(study, options, store, [&] { reporter.look(); });
+    const bool has_begun = by_walks && before.descend(stage);
+    SearchResult found = has_begun  ? runs.descend(1, before.best(), stage)
+                         : by_walks ? runs.descend(study.optimizer.starts, box.initial(), stage)
+                                    : search(objective, study.optimizer, box.initial(), options.seed, stage);
+    found.method += before.method();
     objective.set_budget_left(objective.budget_left() + reserve);
 
     Fit fit;
@@ -283,13 +208,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
             }
             const Eigen::VectorXd x = objective.best()->x;
-            walks.catch_up(of_point(x));
-            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, values = box.values(x)] {
-                Eigen::VectorXd key(values.size() + 1);
-                key << values, 2.0;  // cells so many times as wide
-                return store.at(key, [&] { return run_on_wide_cells(study, values, options.stop_requested); });
-            });
-            close = look_close(objective, nearby.near(x), x, model.curve_lengths(), names, options.seed);
+            runs.walks().catch_up(runs.values_at(x));
+            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
+            close = look_close(objective, runs.nearby().near(x), x, model.curve_lengths(), names, options.seed);
             return close ? close->uncertainty
                          : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
         };

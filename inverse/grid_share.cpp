@@ -1,7 +1,6 @@
 #include "inverse/grid_share.hpp"
 
 #include "forward/kept_walk.hpp"
-#include "forward/simulate.hpp"
 
 #include <Eigen/QR>
 
@@ -48,20 +47,6 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorX
 }
 
 }  // namespace
-
-Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
-    Study wide = study;
-    for (Experiment& experiment : wide.experiments) {
-        experiment.scene.model.cell *= 2.0;
-        experiment.scene.solver.extrapolate = false;
-    }
-    const Forward simulation = [](const Scene& scene, const std::atomic<bool>* end) {
-        SimulateOptions options;
-        options.stop_requested = end;
-        return simulate(scene, options);
-    };
-    return StudyModel(wide, simulation, solver_resolution, stop).at(values, 1);
-}
 
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
     const Eigen::VectorXd values = model.box().values(best.x);

@@ -4,16 +4,11 @@
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
 
-#include <atomic>
-
 namespace crampfit {
-
-/// The study with these values [parameters], SI, on cells twice as wide, each scene on that grid alone. `stop` may be null.
-Evaluation run_on_wide_cells(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop);
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
 ///
-/// Cells twice as wide change the residuals by g (`wide`, usable, with the best point's values), and a fit there would have its
+/// Cells twice as wide, each scene on that grid alone, change the residuals by g (`wide`, usable, with the best point's values), and a fit there would have its
 /// best point off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh them
 /// (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
 /// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,

@@ -139,6 +139,7 @@ Comparison::Comparison(const Experiment& experiment, double model_resolution) : 
     if (fields_) {
         stations_.insert(stations_.end(), fields_->stations().begin(), fields_->stations().end());
     }
+    counts_.resize(stations_.size(), 1.0);
     if (stations_.empty()) {
         throw bad_data(experiment, "crack_length", "constant",
                        "must grow by more than its noise, as there is no force to compare");
@@ -295,11 +296,13 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());
+    counts_.resize(first, 1.0);
     for (std::size_t i = first; i < stations_.size(); ++i) {
         const auto together = std::count_if(alone.begin(), alone.end(), [&](const FitResidual& other) {
             return std::abs(other.measured - stations_[i].measured) <= reach[i - first];
         });
         stations_[i].sigma *= std::sqrt(static_cast<double>(together));
+        counts_.push_back(1.0 / static_cast<double>(together));
     }
 }
 

@@ -47,6 +47,9 @@ class Comparison {
     /// The stations with what was measured at them; `modelled` and `residual` are left at 0.
     const std::vector<FitResidual>& stations() const { return stations_; }
 
+    /// For how many measurements each station counts [stations]: one, or its part of those that share their rows.
+    const std::vector<double>& counts() const { return counts_; }
+
     /// What the record has at each station [stations], SI. All finite if the record's numbers are.
     /// `slack_force` is what the load cell says once the specimen has split [N].
     Eigen::VectorXd modelled(const Record& record, double slack_force = 0.0) const;
@@ -76,6 +79,7 @@ class Comparison {
     double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
+    std::vector<double> counts_;         // [stations]
     std::vector<std::string> remarks_;
 };
 

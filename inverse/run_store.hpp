@@ -39,6 +39,9 @@ class RunStore {
     /// What is known of a run; empty where it has not been made.
     std::optional<Evaluation> known(const Eigen::VectorXd& values);
 
+    /// Counts searches: the number of the next one.
+    std::size_t begin_search() { return begun_++; }
+
     /// What the n-th search among cheap runs has found; empty where `asked`, which tells what it was to look for, differs.
     std::optional<std::vector<double>> found_by_search(std::size_t n, std::uint64_t asked) const;
     void keep_search(std::size_t n, std::uint64_t asked, const std::vector<double>& found);
@@ -49,6 +52,7 @@ class RunStore {
     std::mutex mutex_;
     std::map<std::vector<double>, Evaluation> known_;
     std::map<std::size_t, std::pair<std::uint64_t, std::vector<double>>> searches_;  // of an earlier process
+    std::size_t begun_ = 0;
 };
 
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 
@@ -76,16 +77,20 @@ double StudyModel::change_of_sigma(double resolution) const {
 double StudyModel::likely_resolution(const Evaluation& evaluation, double most) const {
     constexpr double least = 1e-5;  // far below what any grid or gauge knows
     constexpr int steps = 40;
-    const auto rows = static_cast<double>(evaluation.modelled.size());
-    const double share = 1.0 - static_cast<double>(box_.size()) / rows;  // of the rows that the fit leaves free
-    const auto deviance = [&](double resolution) {                       // -2 ln L
+    double measurements = 0;
+    for (const Comparison& comparison : comparisons_) {
+        measurements += std::accumulate(comparison.counts().begin(), comparison.counts().end(), 0.0);
+    }
+    const double share = 1.0 - static_cast<double>(box_.size()) / measurements;  // of them that the fit leaves free
+    const auto deviance = [&](double resolution) {                               // -2 ln L
         double sum = 0;
         Eigen::Index row = 0;
         for (std::size_t i = 0; i < comparisons_.size(); ++i) {
             const Comparison comparison(study_.experiments[i], resolution);
-            for (const FitResidual& station : comparison.stations()) {
+            for (std::size_t k = 0; k < comparison.stations().size(); ++k) {
+                const FitResidual& station = comparison.stations()[k];
                 const double r = softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss);
-                sum += study_.experiments[i].weight * (r * r + share * 2 * std::log(station.sigma));
+                sum += study_.experiments[i].weight * (r * r + share * comparison.counts()[k] * 2 * std::log(station.sigma));
             }
         }
         return sum;

@@ -1,0 +1,141 @@
+#include "inverse/study_runs.hpp"
+
+#include "datasets/run_journal.hpp"
+#include "inverse/pool.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <numeric>
+
+namespace crampfit {
+namespace {
+
+constexpr int most_weighings = 4;  // by another resolution of the model
+
+// All that the lowest point of a cheap model hangs on beyond what the runs do.
+std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
+                            double resolution, double widening, unsigned seed) {
+    Fingerprint print;
+    print.add(point).add(resolution).add(rough).add(seed).add(static_cast<double>(study.optimizer.loss)).add(widening);
+    print.add(std::vector<double>(window.origin.begin(), window.origin.end()));
+    print.add(std::vector<double>(window.axes.reshaped().begin(), window.axes.reshaped().end()));
+    for (const Parameter& parameter : study.parameters) {
+        print.add(parameter.lower).add(parameter.upper).add(static_cast<double>(parameter.scale));
+    }
+    return print.value();
+}
+
+}  // namespace
+
+Study on_wide_cells(const Study& study) {
+    Study wide = study;
+    for (Experiment& experiment : wide.experiments) {
+        experiment.scene.model.cell *= 2.0;
+        experiment.scene.solver.extrapolate = false;
+        experiment.scene.output.frames = 0;
+    }
+    return wide;
+}
+
+StudyRuns::StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run)
+    : study_(study), options_(options), store_(store), widening_(widening), threads_(thread_count(options.threads)),
+      walks_(study, std::max(1, threads_ / std::max(1, static_cast<int>(study.experiments.size())))),
+      only_toughness_(!options.forward && walks_.only_toughness()),
+      by_walks_(!options.forward && study.optimizer.method == "auto" && (only_toughness_ || walks_.has_slopes())),
+      in_order_((by_walks_ || only_toughness_) && walks_.depend_on_order()),
+      model_(study, forward(), options.forward ? 0.0 : solver_resolution, options.stop_requested),
+      nearby_{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks_.exact_near(), walks_.turn_with_toughness(),
+              [this](const auto&... asked) { return recall(asked...); }},
+      // Steps on walks go on from the one before, where the walks are.
+      shared_([this](const Eigen::VectorXd& values, int share) { return model_.at(values, in_order_ ? threads_ : share); },
+              threads_, by_walks_ || in_order_ ? nullptr : options.farm),
+      objective_(
+          model_.box().size(), [this](const Eigen::VectorXd& x, int share) { return run(x, share); }, study.optimizer.max_runs,
+          in_order_ ? 1 : shared_.places(), options.stop_requested, std::move(on_run)) {}
+
+Forward StudyRuns::forward() const {
+    return options_.forward ? options_.forward : by_walks_ || only_toughness_ ? walks_.exact() : walks_.in_any_order();
+}
+
+Near StudyRuns::by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const) {
+    return [this, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
+        auto close = std::make_shared<StudyModel>(study_, (walks_.*runs)(values_at(point)), model_.resolution(),
+                                                  options_.stop_requested);
+        return [close, in_order = in_order_, threads = threads_](const Eigen::VectorXd& x, int share) {
+            return close->evaluate(x, in_order ? threads : share);
+        };
+    };
+}
+
+std::vector<double> StudyRuns::values_at(const Eigen::VectorXd& x) const {
+    const Eigen::VectorXd values = model_.box().values(x);
+    return {values.begin(), values.end()};
+}
+
+// What the store knows a run by.
+Eigen::VectorXd StudyRuns::key_of(const Eigen::VectorXd& values) const {
+    if (widening_ == 1.0) {
+        return values;
+    }
+    Eigen::VectorXd key(values.size() + 1);
+    key << values, widening_;
+    return key;
+}
+
+// What an earlier process has done on walks that hang on one another is done again only where something goes on from them.
+Lowest StudyRuns::recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search) {
+    const std::size_t n = store_.begin_search();
+    const std::uint64_t asked =
+        what_is_asked(study_, values_at(point), window, rough, model_.resolution(), widening_, options_.seed);
+    if (const auto before = store_.found_by_search(n, asked)) {
+        if (in_order_) {
+            walks_.put_off(values_at(point), search);
+        }
+        return Lowest{Eigen::Map<const Eigen::VectorXd>(before->data(), model_.box().size()), before->back()};
+    }
+    walks_.catch_up(values_at(point));
+    const Lowest found = search();
+    std::vector<double> kept(found.x.begin(), found.x.end());
+    kept.push_back(found.misfit);
+    store_.keep_search(n, asked, kept);
+    return found;
+}
+
+Evaluation StudyRuns::run(const Eigen::VectorXd& x, int share) {
+    const Eigen::VectorXd values = model_.box().values(x), key = key_of(values);
+    const auto run = [this, values, share] { return shared_(values, share); };
+    if (in_order_ && store_.known(key)) {
+        walks_.put_off(values_at(x), run);
+    } else if (in_order_) {
+        walks_.catch_up(values_at(x));
+    }
+    Evaluation evaluation = store_.at(key, run);
+    model_.weigh(evaluation, values);  // stored ones may have been weighed by another resolution
+    return evaluation;
+}
+
+SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
+                                const std::function<void(const std::string&)>& stage) {
+    // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
+    const std::vector<int> lengths = model_.curve_lengths();
+    const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
+    SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
+    for (int round = 0; found.converged && round < most_weighings; ++round) {
+        // How well the model knows what it says shows where it fits.
+        const double likely = model_.likely_resolution(*objective_.best()->evaluation, solver_resolution);
+        const bool ended_early = round == 0 && enough > 0;
+        if (!ended_early && model_.change_of_sigma(likely) <= 0.1) {
+            break;
+        }
+        model_.set_resolution(likely);
+        objective_.judge_anew([&](const Run& run) {
+            Evaluation evaluation = *run.evaluation;
+            model_.weigh(evaluation, model_.box().values(run.x));
+            return evaluation;
+        });
+        found.converged = descend_again(objective_, nearby_, options_.seed);
+    }
+    return found;
+}
+
+}  // namespace crampfit

@@ -1,0 +1,66 @@
+#pragma once
+
+#include "inverse/fit.hpp"
+#include "inverse/kept_walks.hpp"
+#include "inverse/objective.hpp"
+#include "inverse/run_store.hpp"
+#include "inverse/search.hpp"
+#include "inverse/study_model.hpp"
+#include "inverse/walk_descent.hpp"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace crampfit {
+
+/// The study with each scene on cells twice as wide, on that grid alone, and without frames.
+Study on_wide_cells(const Study& study);
+
+/// A study on one grid as a fit runs it: its walks, where runs go on from one another, and all runs that were made.
+class StudyRuns {
+  public:
+    /// `widening`: how many times as wide as the fit's own these cells are; the store keeps runs of all grids. All that is given
+    /// must outlive this. Throws InputError for a study that cannot be fitted.
+    StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run);
+    StudyRuns(const StudyRuns&) = delete;
+    StudyRuns& operator=(const StudyRuns&) = delete;
+
+    /// Steps along walks from `initial`, and from further points as long as the noise does not explain the misfit, up to `starts`
+    /// (descend_by_walks), weighed by what the residuals say of the model's resolution.
+    SearchResult descend(int starts, const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
+
+    /// The parameters' values at a point of the unit cube [parameters], SI.
+    std::vector<double> values_at(const Eigen::VectorXd& x) const;
+
+    bool only_toughness() const { return only_toughness_; }
+    bool by_walks() const { return by_walks_; }
+    int threads() const { return threads_; }
+    const KeptWalks& walks() const { return walks_; }
+    const Nearby& nearby() const { return nearby_; }
+    const StudyModel& model() const { return model_; }
+    Objective& objective() { return objective_; }
+
+  private:
+    Forward forward() const;
+    Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
+    Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
+    Evaluation run(const Eigen::VectorXd& x, int share);
+    Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;
+
+    const Study& study_;
+    const FitOptions& options_;
+    RunStore& store_;
+    double widening_;
+    int threads_;
+    KeptWalks walks_;
+    bool only_toughness_;
+    bool by_walks_;
+    bool in_order_;  // the same bits for any number of threads: runs that go on from one another are made one after the other
+    StudyModel model_;
+    Nearby nearby_;
+    Sharing shared_;
+    Objective objective_;
+};
+
+}  // namespace crampfit
