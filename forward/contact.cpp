@@ -176,13 +176,19 @@ Vec2 SlidingBody::current(int facet, const std::vector<Vec2>& displacement) cons
 }
 
 void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displacement) {
+    constexpr double hair = 1e-9;
     const Box box = bounds(shape_);
     const Vec2 margin = search_margin * body_.layout.cell;
     const Box wide{box.low + moved - margin, box.high + moved + margin};
+    double farthest = 0.0;  // that anything has gone: what lies farther from there than that is not asked
+    for (const Vec2& u : displacement) farthest = std::max(farthest, u.squaredNorm());
+    const Vec2 reach = Vec2::Constant((1.0 + hair) * std::sqrt(farthest));
+    const Box at_rest{wide.low - reach, wide.high + reach};
     const std::vector<int> before = std::exchange(near_, {});
     bool torn_anew = false;
     const bool some_only = steps_between_searches_ > 1;  // then friction has not followed the others
     for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
+        if (!at_rest.contains(body_.facets[i].position)) continue;
         const Vec2 x = current(i, displacement);
         if (!wide.contains(x)) continue;
         if (width_ > 0.0 && !near_.empty() && near_.back() == i - 1) torn_anew |= find_joints(i - 1, i);

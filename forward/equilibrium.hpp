@@ -76,6 +76,9 @@ class Equilibrium {
     /// The displacements that such loads would bring about, both [2 x fields, any number].
     Eigen::MatrixXd yields_to(Eigen::MatrixXd loads) const;
 
+    /// What such loads do on each other's motion, loads^T yields_to(loads), at half its cost.
+    Eigen::MatrixXd compliance(const Eigen::MatrixXd& loads) const;
+
     /// Derivatives by numbers of the materials at this equilibrium.
     struct Slopes {
         Eigen::VectorXd potential;  // [numbers] [J / unit]

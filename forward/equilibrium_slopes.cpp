@@ -61,6 +61,13 @@ Eigen::MatrixXd Equilibrium::yields_to(Eigen::MatrixXd loads) const {
     return loads;
 }
 
+Eigen::MatrixXd Equilibrium::compliance(const Eigen::MatrixXd& loads) const {
+    Eigen::MatrixXd right(equations_, loads.cols());
+    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+        if (equation_[dof] >= 0) right.row(equation_[dof]) = loads.row(dof);
+    return factor_.compliance(right);
+}
+
 Equilibrium::Motion Equilibrium::yield_to(const std::vector<Vec2>& load) const {
     Motion motion{std::vector<Vec2>(boundary_.drivers(), Vec2::Zero()), load};
     const auto components = static_cast<Eigen::Index>(2 * load.size());

@@ -362,10 +362,10 @@ void GridFactor::solve_one(Eigen::Ref<Eigen::MatrixXd> right) const {
     });
 }
 
-// Many.
-void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
+// x := L^-1 x for many; gives room for the way back, [boxes][border x columns].
+std::vector<Eigen::MatrixXd> GridFactor::forward_many(Eigen::Ref<Eigen::MatrixXd> x) const {
     using Part = Eigen::MatrixXd;
-    std::vector<Part> left(boxes_.size());  // [boxes][border x columns] what each leaves for the box that it is a half of
+    std::vector<Part> left(boxes_.size());  // what each leaves for the box that it is a half of
     const int top = static_cast<int>(boxes_.size()) - 1;
     upward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
@@ -387,12 +387,17 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
         left[b].noalias() -= box.factor.bottomRows(box.border) * own;
     });
+    return left;
+}
+
+void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
+    std::vector<Eigen::MatrixXd> left = forward_many(x);
     take_off_wide(x);
-    downward(top, forks_, [&](int b) {
+    downward(static_cast<int>(boxes_.size()) - 1, forks_, [&](int b) {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
         auto own = x.middleRows(first_[box.nodes[0]], box.inner);
-        Part& at_border = left[b];
+        Eigen::MatrixXd& at_border = left[b];
         int row = 0;
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
             for (int e = 0; e < count_[box.nodes[k]]; ++e) at_border.row(row++) = x.row(first_[box.nodes[k]] + e);
@@ -404,6 +409,17 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 void GridFactor::solve(Eigen::MatrixXd& right) const {
     if (right.cols() > few_columns) return solve_columns(right);
     for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c));
+}
+
+Eigen::MatrixXd GridFactor::compliance(const Eigen::MatrixXd& right) const {
+    constexpr Eigen::Index together = 32;
+    Eigen::MatrixXd x = right;
+    for (Eigen::Index c = 0; c < x.cols(); c += together) forward_many(x.middleCols(c, std::min(together, x.cols() - c)));
+    Eigen::MatrixXd found = x.transpose() * x;
+    if (wide_.empty()) return found;
+    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), x.cols());
+    for (const WidePart& part : wide_) seen.noalias() += part.columns.transpose() * x.middleRows(part.first, part.columns.rows());
+    return found - seen.transpose() * wide_change_ * seen;
 }
 
 bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness) {

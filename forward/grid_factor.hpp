@@ -44,6 +44,9 @@ class GridFactor {
     /// Solves for right sides [equations x any number], in place.
     void solve(Eigen::MatrixXd& right) const;
 
+    /// What right sides [equations x any number] do on each other's solutions, R^T A^-1 R, which takes half of a solution.
+    Eigen::MatrixXd compliance(const Eigen::MatrixXd& right) const;
+
     /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is
     /// not positive definite.
     bool add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness);
@@ -91,6 +94,7 @@ class GridFactor {
     static void forward_columns(const Eigen::MatrixXd& factor, double* y);
     static void backward_columns(const Eigen::MatrixXd& factor, double* y);
     void solve_one(Eigen::Ref<Eigen::MatrixXd> right) const;
+    std::vector<Eigen::MatrixXd> forward_many(Eigen::Ref<Eigen::MatrixXd> right) const;
     void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;

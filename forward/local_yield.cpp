@@ -13,8 +13,7 @@ namespace crampfit {
 
 namespace {
 
-constexpr double margin = 6.0;                // of the box about the facets, in cells
-constexpr Eigen::Index solved_together = 32;  // loads
+constexpr double margin = 6.0;  // of the box about the facets, in cells
 
 Plan of_box(Plan plan) {
     plan.rotates = plan.friction = plan.contact = plan.remembers = plan.free_bodies = plan.finer_at_wheels = false;
@@ -37,14 +36,7 @@ struct LocalYield::Solved {
     // Of the stations, to such loads on the fields [2 x fields, any number].
     Eigen::MatrixXd yield_to(Eigen::MatrixXd with) const { return loads.transpose() * equilibrium->yields_to(std::move(with)); }
 
-    Eigen::MatrixXd compliance() const {
-        Eigen::MatrixXd found(loads.cols(), loads.cols());
-        for (Eigen::Index first = 0; first < loads.cols(); first += solved_together) {
-            const Eigen::Index count = std::min(solved_together, loads.cols() - first);
-            found.middleCols(first, count) = yield_to(loads.middleCols(first, count));
-        }
-        return found;
-    }
+    Eigen::MatrixXd compliance() const { return equilibrium->compliance(loads); }
 
     // Slope of the compliance by the numbers: -U^T K' U, where U are the displacements of unit forces.
     void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {

@@ -8,9 +8,9 @@ namespace crampfit {
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
 ///
-/// Cells twice as wide, each scene on that grid alone, change the residuals by g (`wide`, usable, with the best point's values), and a fit there would have its
-/// best point off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh them
-/// (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
+/// Cells twice as wide, each scene on that grid alone, change the residuals by g (`wide`, usable, with the best point's values),
+/// and a fit there would have its best point off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh
+/// them (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
 /// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,
 /// Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116), which takes in errors that go
 /// with the first power of the cell. The errors of both grids go the same way, so that it counts against m only. A scene that

@@ -42,8 +42,9 @@ class StudyModel {
     double change_of_sigma(double resolution) const;
 
     /// The resolution up to `most` that makes a usable evaluation's residuals most likely: what they have beyond the data's noise
-    /// is the model's; stations that share their rows count as one measurement (Comparison::counts). Maximum likelihood of a component of variance, `parameters` degrees of freedom being the fit's (Harville
-    /// 1977, Maximum likelihood approaches to variance component estimation, J. Am. Stat. Assoc. 72).
+    /// is the model's; stations that share their rows count as one measurement (Comparison::counts). Maximum likelihood of a
+    /// component of variance, `parameters` degrees of freedom being the fit's (Harville 1977, Maximum likelihood approaches to
+    /// variance component estimation, J. Am. Stat. Assoc. 72).
     double likely_resolution(const Evaluation& evaluation, double most) const;
 
     const UnitBox& box() const { return box_; }

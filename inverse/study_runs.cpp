@@ -59,8 +59,8 @@ Forward StudyRuns::forward() const {
 
 Near StudyRuns::by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const) {
     return [this, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
-        auto close = std::make_shared<StudyModel>(study_, (walks_.*runs)(values_at(point)), model_.resolution(),
-                                                  options_.stop_requested);
+        auto close =
+            std::make_shared<StudyModel>(study_, (walks_.*runs)(values_at(point)), model_.resolution(), options_.stop_requested);
         return [close, in_order = in_order_, threads = threads_](const Eigen::VectorXd& x, int share) {
             return close->evaluate(x, in_order ? threads : share);
         };

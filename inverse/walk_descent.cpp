@@ -79,8 +79,8 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
 }
 
 // The lowest point of the model in the window.
-Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, int threads,
-              const std::atomic<bool>* stop, unsigned seed) {
+Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eigen::VectorXd& centre, bool across_jumps,
+              int threads, const std::atomic<bool>* stop, unsigned seed) {
     const auto in_window = [&](const Eigen::VectorXd& y, int share) { return model(window.inside(y), share); };
     Objective cheap(centre.size(), in_window, most_cheap_runs, threads, stop);
     std::vector<Eigen::VectorXd> starts = sobol_points(model_starts * static_cast<int>(centre.size()), centre.size(), seed);
@@ -92,8 +92,8 @@ Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eige
     for (int i = 0; i < std::min<int>(model_descents, static_cast<int>(order.size())) && !cheap.stopped(); ++i) {
         polish(cheap, order[static_cast<std::size_t>(i)].x);
     }
-    if (cheap.best()) {  // along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes
-                         // its shape
+    // Along a valley with jumps across it slopes mislead, and so do steps along the axes: a population takes its shape.
+    if (cheap.best() && across_jumps) {
         Objective branch = cheap.branch(runs_across_jumps * static_cast<int>(centre.size()), threads);
         minimize(branch, cheap.best()->x, {"crs2", seed});
         cheap.join(branch);
@@ -107,8 +107,8 @@ Lowest lowest(const Objective::Evaluate& model, const Window& window, const Eige
 // That of the model of the runs near a point.
 Lowest lowest_near(const Eigen::VectorXd& point, const Nearby& nearby, bool rough, const Window& window,
                    const Objective& objective, unsigned seed) {
-    const auto search = [model = (rough ? nearby.rough : nearby.near)(point), window, point, threads = objective.threads(),
-                         stop = objective.stop(), seed] { return lowest(model, window, point, threads, stop, seed); };
+    const auto search = [model = (rough ? nearby.rough : nearby.near)(point), window, point, rough, threads = objective.threads(),
+                         stop = objective.stop(), seed] { return lowest(model, window, point, !rough, threads, stop, seed); };
     return nearby.recall ? nearby.recall(point, window, rough, search) : search();
 }
 
