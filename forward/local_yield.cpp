@@ -33,21 +33,18 @@ struct LocalYield::Solved {
     int fields() const { return equilibrium->cracks().fields(); }
     bool solve() { return equilibrium->relax(std::vector<Vec2>(fields(), Vec2::Zero())); }
 
-    // Of the stations, to such loads on the fields [2 x fields, any number].
-    Eigen::MatrixXd yield_to(Eigen::MatrixXd with) const { return loads.transpose() * equilibrium->yields_to(std::move(with)); }
-
     Eigen::MatrixXd compliance() const { return equilibrium->compliance(loads); }
 
     // Slope of the compliance by the numbers: -U^T K' U, where U are the displacements of unit forces.
     void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {
         const std::vector<MaterialSlope>& here = cut.slopes_by(numbers);
-        for (Eigen::Index station = 0; station < loads.cols(); ++station) {
-            const Eigen::VectorXd state = equilibrium->yields_to(loads.col(station));
+        const Eigen::MatrixXd states = equilibrium->yields_to(loads);
+        for (Eigen::Index station = 0; station < states.cols(); ++station) {
             std::vector<Vec2> displacement(fields());
-            for (int f = 0; f < fields(); ++f) displacement[f] = state.segment<2>(2 * f);
+            for (int f = 0; f < fields(); ++f) displacement[f] = states.col(station).segment<2>(2 * f);
             equilibrium->set_displacements(displacement, 0.0);
-            const Eigen::MatrixXd yields = yield_to(equilibrium->slopes(here).fields);
-            for (std::size_t n = 0; n < here.size(); ++n) by_number[n].col(station) -= sign * yields.col(n);
+            const Eigen::MatrixXd pull = states.transpose() * equilibrium->slopes(here).fields;
+            for (std::size_t n = 0; n < here.size(); ++n) by_number[n].col(station) -= sign * pull.col(n);
         }
     }
 

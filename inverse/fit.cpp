@@ -245,7 +245,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             if (there.usable() && uncertainty.slope.size() > 0) {
                 take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty));
             } else {
-                fit.message += fmt::format("What the grid leaves is not known; cells twice as wide: {}. ", there.status);
+                take_in_untold_grid(fit, box, best.x,
+                                    there.usable() ? "no slopes at the best point" : "cells twice as wide: " + there.status);
             }
         }
         fit.misfit = best.evaluation->misfit;

@@ -38,6 +38,26 @@ std::string shift_text(const Parameter& parameter, double value, double shift) {
                : fmt::format("'{}' {:+.2g} %", parameter.name, 100 * shift / value);
 }
 
+// Moves the end of an interval on by a part of the box, within it.
+void go_on(const UnitBox& box, Eigen::Index j, double& end, double by) {
+    const double unit = box.parameters()[static_cast<std::size_t>(j)].unit_factor;
+    end = box.value(j, box.share(j, end * unit) + by) / unit;
+}
+
+// Of a parameter in its unit, by its place in the box.
+double slope_in_unit(const UnitBox& box, Eigen::Index j, const Eigen::VectorXd& x) {
+    return box.slope(j, x[j]) / box.parameters()[static_cast<std::size_t>(j)].unit_factor;
+}
+
+void add_covariance(Fit& fit, const Eigen::MatrixXd& more) {
+    fit.covariance += more;
+    const Eigen::VectorXd sd = fit.covariance.diagonal().cwiseSqrt();
+    for (Eigen::Index j = 0; j < sd.size(); ++j) {
+        fit.parameters[static_cast<std::size_t>(j)].standard_error = sd[j];
+    }
+    fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
+}
+
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorXd& change) {
     const Eigen::VectorXd scale = slope.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
@@ -73,36 +93,48 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        if (std::abs(shifts[j]) > farthest_told * size_of(box.parameters()[static_cast<std::size_t>(j)], values[j])) {
-            fit.message +=
-                "What the grid leaves is not told: a fit on cells twice as wide, which would tell it, goes too far off. ";
-            return;
-        }
-    }
-    Eigen::VectorXd own(box.size());  // in the parameters' units
+    bool is_near = true;
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
-        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
-        const double unit = parameter.unit_factor;
-        double& end = left[j] < 0 ? fitted.lower_95 : fitted.upper_95;
-        end = box.value(j, box.share(j, end * unit) + left[j]) / unit;
-        own[j] = box.slope(j, x[j]) / unit * left[j];
+        is_near = is_near && std::abs(shifts[j]) <= farthest_told * size_of(parameter, values[j]);
         told.push_back(shift_text(parameter, values[j], shifts[j]));
     }
-    const Eigen::VectorXd of_data = fit.covariance.diagonal();
-    fit.covariance += own * own.transpose() / 3.0;  // the mean square of what is spread evenly from 0 to 1
-    const Eigen::VectorXd sd = fit.covariance.diagonal().cwiseSqrt();
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        fit.parameters[static_cast<std::size_t>(j)].standard_error = sd[j];
+    if (!is_near) {
+        const std::string why = "a fit on cells twice as wide, which would tell it, lies too far off: ";
+        take_in_untold_grid(fit, box, x, why + fmt::format("{}", fmt::join(told, ", ")));
+        return;
     }
-    fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
+    Eigen::VectorXd own(box.size());  // in the parameters' units
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
+        go_on(box, j, left[j] < 0 ? fitted.lower_95 : fitted.upper_95, left[j]);
+        own[j] = slope_in_unit(box, j, x) * left[j];
+    }
+    const Eigen::VectorXd of_data = fit.covariance.diagonal();
+    add_covariance(fit, own * own.transpose() / 3.0);  // the mean square of what is spread evenly from 0 to 1
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
     fit.message +=
         fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
                     "Intervals take that in on its side; it makes up to {:.0f} % of a variance. ",
                     fmt::join(told, ", "), 100 * most);
+}
+
+void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why) {
+    Eigen::VectorXd own(box.size());  // in the parameters' units
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        const double by = farthest_told * size_of(parameter, box.value(j, x[j])) / box.slope(j, x[j]);
+        go_on(box, j, fitted.lower_95, -by);
+        go_on(box, j, fitted.upper_95, by);
+        own[j] = slope_in_unit(box, j, x) * by;
+    }
+    add_covariance(fit, Eigen::MatrixXd(own.cwiseAbs2().asDiagonal()) / 3.0);  // of what is spread evenly from -1 to 1
+    fit.message +=
+        fmt::format("What the grid leaves cannot be told: {}. Intervals go on by a tenth of the value to either side for "
+                    "it, which may be too little: finer cells would tell. ",
+                    why);
 }
 
 }  // namespace crampfit

@@ -4,6 +4,8 @@
 #include "inverse/study_model.hpp"
 #include "inverse/uncertainty.hpp"
 
+#include <string>
+
 namespace crampfit {
 
 /// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
@@ -21,8 +23,12 @@ namespace crampfit {
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
 
 /// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
-/// as spread evenly up to there, squares about the best point. Not where it goes beyond a tenth of a parameter's value or, on a
-/// linear scale, of half its box if that is more. The message says it.
+/// as spread evenly up to there, squares about the best point. Where it goes beyond a tenth of a parameter's value or, on a
+/// linear scale, of half its box if that is more, it cannot be told. The message says it.
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left);
+
+/// Where what the grid leaves cannot be told, and why: all intervals go on by that tenth to either side, and errors spread evenly
+/// up to there count, each parameter's by itself.
+void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why);
 
 }  // namespace crampfit

@@ -87,11 +87,18 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     EXPECT_NEAR(fit.parameters[1].standard_error, std::sqrt(9 + e * e / 3), 1e-9);
     EXPECT_NEAR(fit.correlation(0, 1), fit.covariance(0, 1) / std::sqrt(fit.covariance(0, 0) * fit.covariance(1, 1)), 1e-12);
     EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
-    // By more than a tenth of a value: no slope tells that.
-    const double before = fit.parameters[1].lower_95;
+    // By more than a tenth of a value: no slope tells that, and a tenth to either side is the least. d/3 for each as above.
+    const Fit before = fit;
     take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06));
-    EXPECT_EQ(fit.parameters[1].lower_95, before);
-    EXPECT_NE(fit.message.find("is not told"), std::string::npos);
+    for (int j = 0; j < 2; ++j) {
+        const double tenth = 0.1 * box.value(j, x[j]), share = tenth / box.slope(j, x[j]);
+        const FittedParameter &was = before.parameters[j], &is = fit.parameters[j];
+        EXPECT_NEAR(is.lower_95, box.value(j, box.share(j, was.lower_95) - share), 1e-9);
+        EXPECT_NEAR(is.upper_95, box.value(j, box.share(j, was.upper_95) + share), 1e-9);
+        EXPECT_NEAR(fit.covariance(j, j), before.covariance(j, j) + tenth * tenth / 3, 1e-9);
+    }
+    EXPECT_DOUBLE_EQ(fit.covariance(0, 1), before.covariance(0, 1));
+    EXPECT_NE(fit.message.find("cannot be told"), std::string::npos);
 }
 
 // A slack of 0 in a box of 100 um: a shift of 4 um is small beside half of that, one of 6 um is not; neither is a part of 0.
@@ -114,8 +121,9 @@ TEST(UnitGridShare, TellsShiftsOfParametersNearZeroInTheirUnit) {
     EXPECT_NEAR(told.parameters[0].upper_95, 5, 1e-9);
     EXPECT_NEAR(told.covariance(0, 0), 1 + 16.0 / 3, 1e-9);
     EXPECT_NE(told.message.find("'slack' +4 um."), std::string::npos) << told.message;
-    EXPECT_EQ(untold.parameters[0].upper_95, 1);
-    EXPECT_NE(untold.message.find("is not told"), std::string::npos);
+    EXPECT_NEAR(untold.parameters[0].lower_95, -6, 1e-9);  // a tenth of half the box to either side
+    EXPECT_NEAR(untold.parameters[0].upper_95, 6, 1e-9);
+    EXPECT_NE(untold.message.find("cannot be told"), std::string::npos);
 }
 
 }  // namespace
