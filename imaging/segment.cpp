@@ -112,8 +112,11 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
     else if (round.obstacle.empty()) round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
+    const BorderEdges edges(gray, valid, round.borders, width);
+    if (given.empty())
+        for (BorderLine& border : round.borders) border.move(edges.place(), gray.rows);
     WoodLevels levels;
-    round.degree = density_degree(wood, valid, rings, round.borders, width, levels);
+    round.degree = density_degree(wood, gray, valid, rings, round.borders, edges, width, levels);
     if (round.borders.empty()) {  // then it is not known how dark LW is
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
     } else {
@@ -166,11 +169,12 @@ struct FirstLook {
 };
 
 FirstLook look_first(const View& view, const SegmentOptions& options, std::vector<std::string>& notes) {
-    const OrientationField orientation = measure_orientation(view.gray, view.blank == 0, first_scale(view.gray.size()));
-    const GrowthAxis growth = growth_of(view.gray, view.blank, orientation, options, notes);
-    const GrowthFrame frame(growth, view.gray.size());
+    const cv::Mat gray = flatten(view.gray, shown(view.blank));  // or LW in a dark corner is too dark for wood
+    const OrientationField orientation = measure_orientation(gray, view.blank == 0, first_scale(gray.size()));
+    const GrowthAxis growth = growth_of(gray, view.blank, orientation, options, notes);
+    const GrowthFrame frame(growth, gray.size());
     const cv::Mat bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr), blank = frame.turn(view.blank);
-    const Round round = look(frame.turn(view.gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
+    const Round round = look(frame.turn(gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
     return {growth, round.ring_width, countable(round.features)};
 }
 
@@ -233,9 +237,22 @@ void fill_maps(Specimen& specimen, const Round& round, const cv::Mat& classes, c
         }
 }
 
-/// Classes from bright to dark by the picture's own gray; void where it lies in no range.
-cv::Mat classes_by_gray(const std::filesystem::path& image, std::vector<GrayClass> ranges, std::vector<std::string>& names) {
+/// As in an X-ray picture, by what the picture's own gray is told to stand for.
+bool latewood_is_bright(const SegmentOptions& options) {
+    if (options.density) return options.density->density.back() > options.density->density.front();
+    const auto low = [&](const char* material) {
+        const auto found = std::ranges::find(options.gray, material, &GrayClass::material);
+        return found == options.gray.end() ? std::optional<int>() : std::optional<int>(found->low);
+    };
+    const auto early = low("EW"), late = low("LW");
+    return early && late && *late > *early;
+}
+
+/// Classes towards LW by the picture's own gray; void where it lies in no range.
+cv::Mat classes_by_gray(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& names) {
+    std::vector<GrayClass> ranges = options.gray;
     std::ranges::sort(ranges, std::greater{}, &GrayClass::low);
+    if (latewood_is_bright(options)) std::ranges::reverse(ranges);
     std::array<std::uint8_t, 256> meaning;
     meaning.fill(Specimen::void_label);
     for (std::size_t i = 0; i < ranges.size(); ++i) {
@@ -324,7 +341,11 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     specimen.rows = pixels.gray.rows;
     specimen.source = image.string();
     specimen.pixel = pixel_of(image, options, result.notes);
-    const View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    if (latewood_is_bright(options)) {
+        view.gray = 1.0 - view.gray;
+        result.notes.push_back("LW is the brighter wood, as told by --density or --gray");
+    }
     const FirstLook first = look_first_at_some(view, options, result.notes);
     const GrowthFrame frame(first.growth, view.gray.size());
     const cv::Mat gray = flatten(frame.turn(view.gray), first.valid), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
@@ -339,7 +360,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
             options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"} : std::vector<std::string>{"EW", "LW"};
         classes = classify(second.degree, options.classes, width);
     } else {
-        classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
+        classes = frame.turn(classes_by_gray(image, options, specimen.classes));
     }
     if (!options.direction.empty()) second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
     if (options.fit_pith || options.pith) turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);
