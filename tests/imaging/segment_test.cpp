@@ -15,7 +15,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <numbers>
 #include <sstream>
 
