@@ -169,12 +169,11 @@ struct FirstLook {
 };
 
 FirstLook look_first(const View& view, const SegmentOptions& options, std::vector<std::string>& notes) {
-    const cv::Mat gray = flatten(view.gray, shown(view.blank));  // or LW in a dark corner is too dark for wood
-    const OrientationField orientation = measure_orientation(gray, view.blank == 0, first_scale(gray.size()));
-    const GrowthAxis growth = growth_of(gray, view.blank, orientation, options, notes);
-    const GrowthFrame frame(growth, gray.size());
+    const OrientationField orientation = measure_orientation(view.gray, view.blank == 0, first_scale(view.gray.size()));
+    const GrowthAxis growth = growth_of(view.gray, view.blank, orientation, options, notes);
+    const GrowthFrame frame(growth, view.gray.size());
     const cv::Mat bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr), blank = frame.turn(view.blank);
-    const Round round = look(frame.turn(gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
+    const Round round = look(frame.turn(view.gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
     return {growth, round.ring_width, countable(round.features)};
 }
 
