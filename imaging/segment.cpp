@@ -100,6 +100,10 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
     return lines;
 }
 
+// Looks at a picture in one light: until that changes by no more than this part of the brightest gray, and so often at most.
+constexpr double same_light = 0.03;
+constexpr int most_looks = 3;
+
 /// `blank` is what is no specimen whatever else is found.
 Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const cv::Mat& valid, const GrowthFrame& frame,
            const OrientationField& orientation, double ring_width, const std::vector<BorderPolyline>& given) {
@@ -347,10 +351,18 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     }
     const FirstLook first = look_first_at_some(view, options, result.notes);
     const GrowthFrame frame(first.growth, view.gray.size());
-    const cv::Mat gray = flatten(frame.turn(view.gray), first.valid), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
+    const cv::Mat turned = frame.turn(view.gray), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
     const OrientationScale scale = scale_for(first.ring_width, frame);
-    Round second = look(gray, bgr, frame.turn(view.blank), first.valid, frame, orientation_in(gray, first.valid, frame, scale),
-                        first.ring_width, options.borders);
+    cv::Mat valid = first.valid, gray = flatten(turned, valid);
+    Round second;
+    for (int looks = 1;; ++looks) {
+        second = look(gray, bgr, frame.turn(view.blank), valid, frame, orientation_in(gray, valid, frame, scale),
+                      first.ring_width, options.borders);
+        const cv::Mat clearer = countable(second.features), flatter = flatten(turned, clearer);
+        if (looks == most_looks || cv::norm(flatter, gray, cv::NORM_INF) < same_light * cv::norm(gray, cv::NORM_INF)) break;
+        valid = clearer;  // LW that uneven light had hidden shows
+        gray = flatter;
+    }
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
     cv::Mat classes;
