@@ -91,11 +91,18 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
     for (double blur = 0.3; blur < 3; blur *= 1.1)  // pixels; beyond half the reach a blur looks like a slope
         blurs.push_back(blur);
     for (double place = -1; place < 1.01; place += 0.1) places.push_back(place);
-    for (int round = 0; round < 3; ++round) {
+    for (const double next : {0.0, 0.2, 0.04, 0.0}) {  // of these steps; what the blur is off by shows up as slopes
         blur_ = least(blurs, [&](double blur) { return left(blur, place_); });
         place_ = least(places, [&](double place) { return left(blur_, place); });
         for (auto& border : stretches_)  // what is farther than the blur reaches tells nothing of it, and less of the ring's end
             for (Stretch& stretch : border) stretch.narrow(std::max(least_reach, 4 * blur_));
+        if (next == 0) continue;
+        blurs.clear();
+        places.clear();
+        for (int i = -5; i <= 5; ++i) {
+            blurs.push_back(blur_ * std::pow(1.1, i * next));
+            places.push_back(place_ + 0.1 * i * next);
+        }
     }
     std::vector<float> latewood, earlywood;
     for (const auto& border : stretches_)

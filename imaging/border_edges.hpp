@@ -10,6 +10,13 @@ namespace crampfit {
 /// Gray at a ring border as it would be without the picture's blur: where one ring's LW ends and the next one's EW begins.
 struct BorderGrays {
     double latewood = 0, earlywood = 0;
+
+    BorderGrays& operator+=(const BorderGrays& other) {
+        latewood += other.latewood;
+        earlywood += other.earlywood;
+        return *this;
+    }
+    BorderGrays operator/(double by) const { return {latewood / by, earlywood / by}; }
 };
 
 /// What a picture shows on both sides of its ring borders. Wood grows from LW to EW at once, so that a border also tells how

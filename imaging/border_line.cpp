@@ -135,6 +135,19 @@ BorderLine in_frame(const std::vector<double>& row, const std::vector<RowRange>&
 
 }  // namespace
 
+void BorderLine::move(double distance, int rows) {
+    constexpr int reach = 5;  // columns to either side, that tell how steep it is
+    const std::vector<double> before = v;
+    const int count = static_cast<int>(v.size());
+    for (int i = 0; i < count; ++i) {
+        int a = i, b = i;
+        while (a > std::max(0, i - reach) && std::isfinite(before[a - 1])) --a;
+        while (b < std::min(count - 1, i + reach) && std::isfinite(before[b + 1])) ++b;
+        const double slope = b > a ? (before[b] - before[a]) / (b - a) : 0;
+        if (std::isfinite(before[i])) v[i] = std::clamp(before[i] + distance * std::hypot(1, slope), 0.0, rows - 1.0);
+    }
+}
+
 std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank,
                                     const RingCoordinate& rings, const std::vector<BorderGuess>& guesses) {
     std::vector<float> rooms;

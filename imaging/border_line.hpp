@@ -19,6 +19,8 @@ struct BorderLine {
     int end() const { return first + static_cast<int>(v.size()); }
     bool covers(int u) const { return u >= first && u < end() && std::isfinite(at(u)); }
     double at(int u) const { return v[static_cast<std::size_t>(u - first)]; }
+    /// Along its normal, towards the bark [pixels]; what would leave the frame of so many rows stays at its edge.
+    void move(double distance, int rows);
 };
 
 /// About where a border runs.

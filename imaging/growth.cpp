@@ -13,6 +13,7 @@ namespace {
 
 constexpr double plain_skewness = 0.15;  // of the steps' cubes, -1..1
 constexpr double plain_spread = 0.05;    // of the radial direction across the picture [rad]
+constexpr double least_share = 1.0 / 3;  // of the directions' variance, that is the spread: of waves it is less
 
 /// Sum of the cubes of gray's steps down the straightened columns, over that of their sizes.
 double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
@@ -27,9 +28,9 @@ double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordi
     return all > 0 ? cv::sum(slope.mul(slope).mul(slope))[0] / all : 0;
 }
 
-/// How far the directions turn outward from one side of the frame to the other [rad].
+/// How far the directions turn outward from one side of the frame to the other [rad]; 0 where that is but waves' chance.
 double spread(const OrientationField& field, const GrowthFrame& frame) {
-    double weight = 0, mean_u = 0, mean_angle = 0, uu = 0, ua = 0;
+    double weight = 0, mean_u = 0, mean_angle = 0, uu = 0, ua = 0, aa = 0;
     const auto for_all = [&](const auto& visit) {
         for (int j = 0; j < field.coherency.rows; ++j)
             for (int i = 0; i < field.coherency.cols; ++i) {
@@ -51,8 +52,9 @@ double spread(const OrientationField& field, const GrowthFrame& frame) {
     for_all([&](double w, double u, double angle) {
         uu += w * (u - mean_u) * (u - mean_u);
         ua += w * (u - mean_u) * (angle - mean_angle);
+        aa += w * (angle - mean_angle) * (angle - mean_angle);
     });
-    return uu > 0 ? ua / uu * frame.size().width : 0;
+    return ua * ua > least_share * uu * aa ? ua / uu * frame.size().width : 0;
 }
 
 }  // namespace

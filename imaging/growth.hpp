@@ -14,7 +14,7 @@ struct GrowthGuess {
 
 /// Rings lie across the axis that is nearer to the mean direction. Along it LW ends sharply and begins gradually, so the
 /// steepest steps of gray are rises; where steps are alike both ways, rings are arcs about the pith and the radial
-/// directions spread out with the growth; where neither shows, + is assumed, and said.
+/// directions spread out with the growth, more than rings wave; where neither shows, + is assumed, and said.
 /// `gray` and `valid`, 0 where a pixel must not count and else 1, are float.
 GrowthGuess guess_growth(const cv::Mat& gray, const cv::Mat& valid, const OrientationField& field);
 

@@ -39,29 +39,39 @@ Tensor gradients(const cv::Mat& gray, const cv::Mat& valid, double sigma) {
     return tensor;
 }
 
-/// Means over squares of `step` pixels; what hangs over the edge counts as 0.
-cv::Mat reduced(const cv::Mat& pixels, int step) {
-    const int right = (step - pixels.cols % step) % step, bottom = (step - pixels.rows % step) % step;
+/// Means over rectangles of `step` pixels; what hangs over the edge counts as 0.
+cv::Mat reduced(const cv::Mat& pixels, cv::Size step) {
+    if (step == cv::Size(1, 1)) return pixels;
+    const int right = (step.width - pixels.cols % step.width) % step.width,
+              bottom = (step.height - pixels.rows % step.height) % step.height;
     cv::Mat padded, small;
     cv::copyMakeBorder(pixels, padded, 0, bottom, 0, right, cv::BORDER_CONSTANT, cv::Scalar(0));
-    cv::resize(padded, small, padded.size() / step, 0, 0, cv::INTER_AREA);
+    cv::resize(padded, small, {padded.cols / step.width, padded.rows / step.height}, 0, 0, cv::INTER_AREA);
     return small;
 }
 
-/// Gaussian-weighted moments of order up to 2 about each point.
+/// Gaussian-weighted moments of order up to 2 about each point, but for a factor common to all.
 class Moments {
   public:
     /// Standard deviations along x and y [nodes].
-    explicit Moments(cv::Size2d sigma) : x_(kernels(sigma.width)), y_(kernels(sigma.height)) {}
+    explicit Moments(cv::Size2d sigma)
+        : step_(step_for(sigma.width), step_for(sigma.height)), x_(kernels(sigma.width / step_.width)),
+          y_(kernels(sigma.height / step_.height)) {}
 
     /// Of x^a y^b, lengths in units of their sigma.
     cv::Mat operator()(const cv::Mat& values, int a, int b) const {
+        const cv::Mat small = reduced(values, step_);
         cv::Mat out;
-        cv::sepFilter2D(values, out, CV_32F, x_[a], y_[b], {-1, -1}, 0, cv::BORDER_CONSTANT);
-        return out;
+        cv::sepFilter2D(small, out, CV_32F, x_[a], y_[b], {-1, -1}, 0, cv::BORDER_CONSTANT);
+        if (step_ == cv::Size(1, 1)) return out;
+        cv::resize(out, out, {step_.width * out.cols, step_.height * out.rows}, 0, 0, cv::INTER_LINEAR);
+        return out(cv::Rect(0, 0, values.cols, values.rows));
     }
 
   private:
+    /// Nodes at a time: an eighth of a window tells as much.
+    static int step_for(double sigma) { return std::max(1, static_cast<int>(sigma / 8)); }
+
     static std::array<cv::Mat, 3> kernels(double sigma) {
         const int half = static_cast<int>(std::ceil(3 * sigma));
         std::array<cv::Mat, 3> all;
@@ -74,6 +84,7 @@ class Moments {
         return all;
     }
 
+    cv::Size step_;
     std::array<cv::Mat, 3> x_, y_;
 };
 
@@ -83,8 +94,8 @@ int step_for(cv::Size2d window) { return std::max(1, static_cast<int>(std::min(w
 cv::Mat coherency_of(const Tensor& tensor, cv::Size2d window) {
     const int step = step_for(window);
     const Moments moments(window * (1.0 / step));
-    const cv::Mat energy = moments(reduced(tensor.energy, step), 0, 0), c = moments(reduced(tensor.cos2, step), 0, 0),
-                  s = moments(reduced(tensor.sin2, step), 0, 0);
+    const cv::Mat energy = moments(reduced(tensor.energy, {step, step}), 0, 0),
+                  c = moments(reduced(tensor.cos2, {step, step}), 0, 0), s = moments(reduced(tensor.sin2, {step, step}), 0, 0);
     cv::Mat length, coherency;
     cv::magnitude(c, s, length);
     coherency = length / cv::max(energy, 1e-12);
@@ -97,7 +108,8 @@ OrientationField fit(const Tensor& tensor, cv::Size2d window) {
     OrientationField field;
     const int step = step_for(window);
     field.step = step;
-    const cv::Mat energy = reduced(tensor.energy, step), c = reduced(tensor.cos2, step), s = reduced(tensor.sin2, step);
+    const cv::Mat energy = reduced(tensor.energy, {step, step}), c = reduced(tensor.cos2, {step, step}),
+                  s = reduced(tensor.sin2, {step, step});
     const Moments moments(window * (1.0 / step));
     const cv::Mat m00 = moments(energy, 0, 0), m10 = moments(energy, 1, 0), m01 = moments(energy, 0, 1),
                   m20 = moments(energy, 2, 0), m11 = moments(energy, 1, 1), m02 = moments(energy, 0, 2);
@@ -128,10 +140,9 @@ OrientationField fit(const Tensor& tensor, cv::Size2d window) {
 
 /// Where gradients disagree the doubled vector of around is taken, weighted by coherency.
 void fill_in(OrientationField& field, cv::Size2d window) {
-    cv::Mat sum_c, sum_s;
-    const cv::Size2d sigma = window * (2 / field.step);
-    cv::GaussianBlur(field.cos2.mul(field.coherency), sum_c, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
-    cv::GaussianBlur(field.sin2.mul(field.coherency), sum_s, {}, sigma.width, sigma.height, cv::BORDER_REFLECT);
+    const Moments around_each(window * (2 / field.step));
+    const cv::Mat sum_c = around_each(field.cos2.mul(field.coherency), 0, 0),
+                  sum_s = around_each(field.sin2.mul(field.coherency), 0, 0);
     const double all_c = cv::sum(field.cos2.mul(field.coherency))[0], all_s = cv::sum(field.sin2.mul(field.coherency))[0];
     const double all = std::hypot(all_c, all_s);
     for (int j = 0; j < sum_c.rows; ++j) {

@@ -100,6 +100,10 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
     return lines;
 }
 
+// Looks at a picture in one light: until that changes by no more than this part of the brightest gray, and so often at most.
+constexpr double same_light = 0.03;
+constexpr int most_looks = 3;
+
 /// `blank` is what is no specimen whatever else is found.
 Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const cv::Mat& valid, const GrowthFrame& frame,
            const OrientationField& orientation, double ring_width, const std::vector<BorderPolyline>& given) {
@@ -112,8 +116,11 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
     else if (round.obstacle.empty()) round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
     const double width = round.ring_width > 0 ? round.ring_width : gray.rows / 10.0;
+    const BorderEdges edges(gray, valid, round.borders, width);
+    if (given.empty())
+        for (BorderLine& border : round.borders) border.move(edges.place(), gray.rows);
     WoodLevels levels;
-    round.degree = density_degree(wood, valid, rings, round.borders, width, levels);
+    round.degree = density_degree(wood, gray, valid, rings, round.borders, edges, width, levels);
     if (round.borders.empty()) {  // then it is not known how dark LW is
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
     } else {
@@ -233,9 +240,22 @@ void fill_maps(Specimen& specimen, const Round& round, const cv::Mat& classes, c
         }
 }
 
-/// Classes from bright to dark by the picture's own gray; void where it lies in no range.
-cv::Mat classes_by_gray(const std::filesystem::path& image, std::vector<GrayClass> ranges, std::vector<std::string>& names) {
+/// As in an X-ray picture, by what the picture's own gray is told to stand for.
+bool latewood_is_bright(const SegmentOptions& options) {
+    if (options.density) return options.density->density.back() > options.density->density.front();
+    const auto low = [&](const char* material) {
+        const auto found = std::ranges::find(options.gray, material, &GrayClass::material);
+        return found == options.gray.end() ? std::optional<int>() : std::optional<int>(found->low);
+    };
+    const auto early = low("EW"), late = low("LW");
+    return early && late && *late > *early;
+}
+
+/// Classes towards LW by the picture's own gray; void where it lies in no range.
+cv::Mat classes_by_gray(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& names) {
+    std::vector<GrayClass> ranges = options.gray;
     std::ranges::sort(ranges, std::greater{}, &GrayClass::low);
+    if (latewood_is_bright(options)) std::ranges::reverse(ranges);
     std::array<std::uint8_t, 256> meaning;
     meaning.fill(Specimen::void_label);
     for (std::size_t i = 0; i < ranges.size(); ++i) {
@@ -324,13 +344,25 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     specimen.rows = pixels.gray.rows;
     specimen.source = image.string();
     specimen.pixel = pixel_of(image, options, result.notes);
-    const View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    if (latewood_is_bright(options)) {
+        view.gray = 1.0 - view.gray;
+        result.notes.push_back("LW is the brighter wood, as told by --density or --gray");
+    }
     const FirstLook first = look_first_at_some(view, options, result.notes);
     const GrowthFrame frame(first.growth, view.gray.size());
-    const cv::Mat gray = flatten(frame.turn(view.gray), first.valid), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
+    const cv::Mat turned = frame.turn(view.gray), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
     const OrientationScale scale = scale_for(first.ring_width, frame);
-    Round second = look(gray, bgr, frame.turn(view.blank), first.valid, frame, orientation_in(gray, first.valid, frame, scale),
-                        first.ring_width, options.borders);
+    cv::Mat valid = first.valid, gray = flatten(turned, valid);
+    Round second;
+    for (int looks = 1;; ++looks) {
+        second = look(gray, bgr, frame.turn(view.blank), valid, frame, orientation_in(gray, valid, frame, scale),
+                      first.ring_width, options.borders);
+        const cv::Mat clearer = countable(second.features), flatter = flatten(turned, clearer);
+        if (looks == most_looks || cv::norm(flatter, gray, cv::NORM_INF) < same_light * cv::norm(gray, cv::NORM_INF)) break;
+        valid = clearer;  // LW that uneven light had hidden shows
+        gray = flatter;
+    }
 
     const double width = second.ring_width > 0 ? second.ring_width : gray.rows / 10.0;
     cv::Mat classes;
@@ -339,7 +371,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
             options.classes == 3 ? std::vector<std::string>{"EW", "transition", "LW"} : std::vector<std::string>{"EW", "LW"};
         classes = classify(second.degree, options.classes, width);
     } else {
-        classes = frame.turn(classes_by_gray(image, options.gray, specimen.classes));
+        classes = frame.turn(classes_by_gray(image, options, specimen.classes));
     }
     if (!options.direction.empty()) second.orientation = orientation_of(options.direction, pixels.gray.size(), scale);
     if (options.fit_pith || options.pith) turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);

@@ -1,7 +1,7 @@
 #include "imaging/wood_classes.hpp"
 
-#include "imaging/border_edges.hpp"
 #include "imaging/quantile.hpp"
+#include "imaging/ring_profile.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -34,93 +34,72 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
-/// The line through some points by least squares, at a place.
-double line_at(double place, const std::vector<cv::Point2d>& points) {
-    cv::Point2d mean;
-    for (const cv::Point2d& point : points) mean += point / static_cast<double>(points.size());
-    double xx = 0, xy = 0;
-    for (const cv::Point2d& point : points) {
-        xx += (point.x - mean.x) * (point.x - mean.x);
-        xy += (point.x - mean.x) * (point.y - mean.y);
-    }
-    return mean.y + xy / xx * (place - mean.x);
+/// Over the columns that both cover; 0 for none.
+double mean_distance(const BorderLine& inner, const BorderLine& outer, int from, int to) {
+    double sum = 0;
+    int count = 0;
+    for (int u = from; u < to; ++u)
+        if (inner.covers(u) && outer.covers(u)) {
+            sum += outer.at(u) - inner.at(u);
+            ++count;
+        }
+    return sum / std::max(count, 1);
 }
-
-/// Mean gray of a stretch of ring, from its inner border to the outer, in steps of about a pixel.
-class RingProfile {
-  public:
-    explicit RingProfile(double width)
-        : sum_(static_cast<std::size_t>(std::max(1l, std::lround(width))), 0.0), count_(sum_.size(), 0) {}
-
-    /// `place` is 0 at the inner border, 1 at the outer.
-    void add(double place, float gray) {
-        const auto i = std::min(sum_.size() - 1, static_cast<std::size_t>(place * static_cast<double>(sum_.size())));
-        sum_[i] += gray;
-        ++count_[i];
-    }
-    /// The brightest and the darkest of its means over a few steps, or of what its ends have: EW may darken from its very
-    /// beginning. Where an end is not known it is what the means tend to there.
-    WoodLevels extremes(const std::optional<BorderGrays>& inner, const std::optional<BorderGrays>& outer) const {
-        const std::size_t n = sum_.size(), reach = n / 40;
-        std::vector<cv::Point2d> means;  // over the place in the ring, in steps
-        for (std::size_t i = 0; i < n; ++i) {
-            double sum = 0;
-            int count = 0;
-            for (std::size_t k = i - std::min(i, reach); k <= std::min(n - 1, i + reach); ++k) {
-                sum += sum_[k];
-                count += count_[k];
-            }
-            if (count_[i] > 0) means.emplace_back(static_cast<double>(i) + 0.5, sum / count);
-        }
-        const auto [dark, bright] = std::ranges::minmax(means, {}, &cv::Point2d::y);
-        const std::size_t some = std::max<std::size_t>(3, means.size() / 8);
-        WoodLevels levels{bright.y, dark.y};
-        if (means.size() >= 2 * some) {
-            const double begin = line_at(0, {means.begin(), means.begin() + static_cast<std::ptrdiff_t>(some)});
-            const double end = line_at(static_cast<double>(n), {means.end() - static_cast<std::ptrdiff_t>(some), means.end()});
-            levels.earlywood = std::max(levels.earlywood, inner ? inner->earlywood : begin);
-            levels.latewood = std::min(levels.latewood, outer ? outer->latewood : end);
-        }
-        return levels;
-    }
-
-  private:
-    std::vector<double> sum_;
-    std::vector<int> count_;
-};
 
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
     /// The ring between border `ring` - 1 and border `ring`.
-    RingLevels(const cv::Mat& gray, const cv::Mat& valid, const std::vector<BorderLine>& borders, const BorderEdges& edges,
-               std::size_t ring, int stretch) {
+    RingLevels(const cv::Mat& pixels, const cv::Mat& smooth, const cv::Mat& valid, const std::vector<BorderLine>& borders,
+               const BorderEdges& edges, std::size_t ring, int stretch) {
         const BorderLine &inner = borders[ring - 1], &outer = borders[ring];
         const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
+        std::vector<RingProfile> profiles;
+        BorderGrays at_inner, at_outer;  // sums over the stretches
+        const double width = mean_distance(inner, outer, from, to);
+        int edges_seen = 0;
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;
-            std::optional<RingProfile> profile;
+            RingProfile profile(width);
             std::vector<float> grays;
             for (int u = begin; u < end; u += step) {
                 if (!inner.covers(u) || !outer.covers(u)) continue;
-                const double width = outer.at(u) - inner.at(u);
-                if (!profile) profile.emplace(width);
-                for (int v = static_cast<int>(inner.at(u)) + 2; v <= static_cast<int>(outer.at(u)) - 1; ++v)
-                    if (valid.at<float>(v, u) > 0) {
-                        grays.push_back(gray.at<float>(v, u));
-                        profile->add((v - inner.at(u)) / width, grays.back());
-                    }
+                const double here = outer.at(u) - inner.at(u);
+                for (int v = static_cast<int>(inner.at(u)) + 1; v <= static_cast<int>(outer.at(u)); ++v) {
+                    if (valid.at<float>(v, u) == 0) continue;
+                    profile.add((v - inner.at(u)) / here, pixels.at<float>(v, u));
+                    grays.push_back(smooth.at<float>(v, u));
+                }
             }
             if (grays.size() < least_pixels) continue;
             columns_.push_back(0.5 * (begin + end - 1));
-            const int middle = (begin + end) / 2;
-            levels_.push_back(profile->extremes(edges.at(ring - 1, middle), edges.at(ring, middle)));
             ranges_.push_back({quantile(grays, bright_share), quantile(grays, dark_share)});
+            const int middle = (begin + end) / 2;
+            if (const auto one = edges.at(ring - 1, middle), other = edges.at(ring, middle); one && other) {
+                at_inner += *one;
+                at_outer += *other;
+                ++edges_seen;
+            }
+            profiles.push_back(std::move(profile));
+        }
+        if (profiles.empty()) return;
+        RingProfile all(width);
+        for (const RingProfile& profile : profiles) all.add(profile);
+        SharpProfile sharp = all.seen();
+        if (edges_seen > 0) {
+            sharp = all.sharpened(edges.blur(), at_inner / edges_seen, at_outer / edges_seen);
+            latewood_fraction_ = sharp.latewood_fraction;
+        }
+        for (const RingProfile& profile : profiles) {
+            const auto [first, second] = all.line_to(profile);
+            levels_.push_back({first + second * sharp.earlywood, first + second * sharp.latewood});
         }
     }
 
     bool empty() const { return levels_.empty(); }
+    /// Of the wood as it is without the picture's blur, where that is known.
+    const std::optional<double>& latewood_fraction() const { return latewood_fraction_; }
     /// What most of the wood's grays lie between, noise and all.
     const std::vector<WoodLevels>& ranges() const { return ranges_; }
 
@@ -143,6 +122,7 @@ class RingLevels {
   private:
     std::vector<double> columns_;
     std::vector<WoodLevels> levels_, ranges_;
+    std::optional<double> latewood_fraction_;
 };
 
 WoodLevels usual_range(const std::vector<RingLevels>& rings) {
@@ -204,6 +184,32 @@ void remove_specks(cv::Mat& label, int one, int other, double least) {
             if (small[patches.at<int>(v, u)]) label.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(other);
 }
 
+/// Blur and noise move the place where a ring's degree passes one half, and less on its steep side than on the other. So half is
+/// set to the degree beyond which as much of the ring lies as is LW in its profile.
+/// `own` is the number of each ring's levels, -1 of one that is not whole; `nearest` of those that it takes.
+void set_half(cv::Mat& degree, const cv::Mat& numbers, const cv::Mat& valid, const std::vector<BorderLine>& borders,
+              const std::vector<RingLevels>& whole, const std::vector<int>& own, const std::vector<int>& nearest) {
+    constexpr double most = 0.15;  // that half moves: of two plateaus nothing lies in between
+    std::vector<std::vector<float>> degrees(whole.size());
+    const auto ring_at = [&](int v, int u) { return static_cast<std::size_t>(numbers.at<int>(v, u)); };
+    for (int v = 0; v < degree.rows; ++v)
+        for (int u = 0; u < degree.cols; ++u)
+            if (const std::size_t ring = ring_at(v, u);
+                own[ring] >= 0 && valid.at<float>(v, u) > 0 && borders[ring - 1].covers(u) && borders[ring].covers(u))
+                degrees[static_cast<std::size_t>(own[ring])].push_back(degree.at<float>(v, u));
+    std::vector<float> half(whole.size(), 0.5f);
+    for (std::size_t i = 0; i < whole.size(); ++i)
+        if (const auto& late = whole[i].latewood_fraction())
+            half[i] = static_cast<float>(std::clamp(quantile(degrees[i], 1 - *late), 0.5 - most, 0.5 + most));
+    for (int v = 0; v < degree.rows; ++v)
+        for (int u = 0; u < degree.cols; ++u)
+            if (const int ring = nearest[ring_at(v, u)]; ring >= 0) {
+                float& here = degree.at<float>(v, u);
+                const float seen = half[static_cast<std::size_t>(ring)];
+                here = here < seen ? 0.5f * here / seen : 0.5f + 0.5f * (here - seen) / (1 - seen);
+            }
+}
+
 }  // namespace
 
 cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
@@ -220,14 +226,13 @@ cv::Mat ring_numbers(const std::vector<BorderLine>& borders, cv::Size frame) {
     return numbers;
 }
 
-cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const RingCoordinate& rings,
-                       const std::vector<BorderLine>& borders, double ring_width, WoodLevels& range) {
+cv::Mat density_degree(const StraightWood& wood, const cv::Mat& pixels, const cv::Mat& valid, const RingCoordinate& rings,
+                       const std::vector<BorderLine>& borders, const BorderEdges& edges, double ring_width, WoodLevels& range) {
     const cv::Mat smooth = smooth_wood(wood, rings, ring_width);
-    const BorderEdges edges(smooth, valid, borders, ring_width);
     std::vector<RingLevels> whole;  // rings that lie between two borders
     std::vector<int> nearest_whole(borders.size() + 1, -1);
     for (std::size_t i = 1; i < borders.size(); ++i) {
-        RingLevels ring(smooth, valid, borders, edges, i, std::max(40, static_cast<int>(ring_width)));
+        RingLevels ring(pixels, smooth, valid, borders, edges, i, std::max(40, static_cast<int>(ring_width)));
         if (!ring.empty()) {
             nearest_whole[i] = static_cast<int>(whole.size());
             whole.push_back(std::move(ring));
@@ -235,6 +240,7 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
     }
     range = whole.empty() ? otsu_levels(smooth, valid) : usual_range(whole);
     for (RingLevels& ring : whole) ring.mend(range);
+    const std::vector<int> own = nearest_whole;
     for (std::size_t i = 1; i < nearest_whole.size(); ++i)
         if (nearest_whole[i] < 0) nearest_whole[i] = nearest_whole[i - 1];
     for (std::size_t i = nearest_whole.size() - 1; i-- > 0;)
@@ -259,6 +265,7 @@ cv::Mat density_degree(const StraightWood& wood, const cv::Mat& valid, const Rin
                 degree.at<float>(v, u) = static_cast<float>((here.earlywood - gray) / std::max(here.contrast(), 1e-6));
             }
     });
+    set_half(degree, numbers, valid, borders, whole, own, nearest_whole);
     return degree;
 }
 

@@ -167,6 +167,28 @@ TEST(UnitSegment, DensityByATable) {
     EXPECT_THROW(load_specimen(scene), InputError);
 }
 
+// The negative of a picture shows the same wood where a table of density, or ranges of gray, say that LW is its brighter part.
+TEST(UnitSegment, BrightLatewood) {
+    const EndGrain grown = grow_end_grain({});
+    const cv::Mat dark(grown.rows, grown.columns, CV_8U, const_cast<std::uint8_t*>(grown.gray.data())), bright = 255 - dark;
+    const SegmentOptions told{.growth = GrowthAxis::right};
+    SegmentOptions by_density = told, by_gray = told;
+    by_density.density = DensityTable{{0, 255}, {100, 1000}};
+    by_gray.gray = {{"EW", 0, 110}, {"LW", 111, 255}};
+    const Specimen expected = segment_pixels(dark, told).specimen, dense = segment_pixels(bright, by_density).specimen,
+                   gray = segment_pixels(bright, by_gray).specimen;
+    ASSERT_GE(expected.rings.size(), 3u);
+    ASSERT_EQ(dense.rings.size(), expected.rings.size());
+    ASSERT_EQ(gray.rings.size(), expected.rings.size());
+    EXPECT_EQ(gray.classes, (std::vector<std::string>{"EW", "LW"}));
+    for (std::size_t i = 0; i < expected.rings.size(); ++i) {
+        EXPECT_NEAR(dense.rings[i].width, expected.rings[i].width, 0.1);
+        EXPECT_NEAR(gray.rings[i].width, expected.rings[i].width, 0.1);
+        EXPECT_NEAR(dense.rings[i].latewood_fraction, expected.rings[i].latewood_fraction, 0.01);
+        EXPECT_NEAR(gray.rings[i].latewood_fraction, expected.rings[i].latewood_fraction, 0.05);  // the range is a guess
+    }
+}
+
 // Bright dots in LW are canals and no rays; LW fractions do not count them.
 TEST(UnitSegment, ResinCanalsAreKeptApart) {
     const EndGrain grown = grow_end_grain({.ray_contrast = 0.0});

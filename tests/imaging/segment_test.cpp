@@ -15,7 +15,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <numbers>
 #include <sstream>
 
@@ -251,111 +250,6 @@ TEST(VerificationSegment, DepthAndFormatDoNotMatter) {
         const Specimen specimen = segment_pixels(pixels, {}, name).specimen;
         EXPECT_EQ(specimen.label, expected.label) << name;
         EXPECT_EQ(specimen.borders.size(), expected.borders.size()) << name;
-    }
-}
-
-// Drawn rings, whose EW is the picture's even white and whose LW its black, are wood and no ground around a specimen; the
-// direction of wavy ones is known: r + a sin(k theta r0) is constant along a ring. The others run askew and wave by 6 and 15
-// degrees, under noise of 5 %. Bars of the borders and of the orientation as above.
-TEST(VerificationSegment, WavyRings) {
-    const struct {
-        const char* name;
-        cv::Point2d pith;
-        double a, wave;      // amplitude, length of the waves [px]
-        double dark, noise;  // of LW, standard deviation [grays]
-    } cases[] = {{"drawn", {-1200, 180}, 2, 140, 0, 0},
-                 {"askew", {-600, 1000}, 2, 120, 70, 0.05 * 255},
-                 {"steep waves askew", {-600, 1000}, 6, 140, 70, 0.05 * 255}};
-    const cv::Size size(500, 400);
-    constexpr double period = 50;
-    for (const auto& [name, pith, a, wave, dark, noise] : cases) {
-        const double r0 = std::hypot(250 - pith.x, 200 - pith.y);
-        const auto radius = [&](double x, double y) {
-            const double theta = std::atan2(y - pith.y, x - pith.x);
-            return std::hypot(x - pith.x, y - pith.y) + a * std::sin(2 * pi / wave * theta * r0);
-        };
-        cv::Mat pixels(size, CV_32F), grain(size, CV_32F);
-        for (int y = 0; y < size.height; ++y)
-            for (int x = 0; x < size.width; ++x) {
-                int light = 0;  // of 5 x 5 places in the pixel
-                for (int i = 0; i < 25; ++i)
-                    light += std::fmod(radius(x + (i % 5 - 2) / 5.0, y + (i / 5 - 2) / 5.0), period) < 0.7 * period;
-                pixels.at<float>(y, x) = static_cast<float>(dark + light / 25.0 * (noise > 0 ? 130 : 255));
-            }
-        cv::RNG(7).fill(grain, cv::RNG::NORMAL, 0, noise);
-        pixels += grain;
-        pixels.convertTo(pixels, CV_8U);
-        const Specimen specimen = segment_pixels(pixels, {.growth = GrowthAxis::right}).specimen;
-        std::size_t crossing = 0;  // at the picture's middle row, three pixels within
-        for (int x = 4; x < size.width - 3; ++x)
-            crossing += std::floor(radius(x, 200) / period) > std::floor(radius(x - 1, 200) / period);
-        EXPECT_GE(specimen.borders.size(), crossing) << name;  // others cut a corner
-        std::vector<double> misses;                            // [px]
-        for (const BorderPolyline& border : specimen.borders)
-            for (const Eigen::Vector2d& point : border.points)
-                misses.push_back(std::abs(std::remainder(radius(point.x(), point.y()), period)));
-        std::sort(misses.begin(), misses.end());
-        std::vector<double> errors;  // [deg]
-        for (int y = 0; y < size.height; y += 5)
-            for (int x = 0; x < size.width; x += 5) {
-                const double dx = radius(x + 0.5, y) - radius(x - 0.5, y), dy = radius(x, y + 0.5) - radius(x, y - 0.5);
-                const double found = specimen.orientation[static_cast<std::size_t>(y) * specimen.columns + x];
-                errors.push_back(std::abs(std::remainder(found - std::atan2(-dy, dx), pi)) * 180 / pi);
-            }
-        std::sort(errors.begin(), errors.end());
-        std::printf("%s: borders 99 %% within %.2f, worst %.2f px; direction mean %.2f, 95 %% within %.2f deg\n", name,
-                    at_share(misses, 0.99), misses.back(), mean(errors), at_share(errors, 0.95));
-        EXPECT_LT(at_share(misses, 0.99), 1) << name;
-        EXPECT_LT(mean(errors), 1) << name;
-        EXPECT_LT(at_share(errors, 0.95), 3) << name;
-    }
-}
-
-// Rings whose EW darkens from its very beginning and whose LW does to its very end, blurred, waving, under noise of 5 % and
-// uneven light. LW is what lies beyond half of a ring's range (the half-range rule) in the wood, not in its blurred picture. Bars
-// of the LW fraction and of the classes as above.
-TEST(VerificationSegment, RingsWithoutAPlateau) {
-    const struct {
-        const char* name;
-        std::function<double(double)> degree;  // over the place in the ring, 0 to 1
-        double latewood;                       // fraction
-    } cases[] = {{"saw-tooth", [](double x) { return x; }, 0.5},
-                 {"power", [](double x) { return std::pow(x, std::log(0.5) / std::log(0.7)); }, 0.3},
-                 {"kinked", [](double x) { return x < 0.7 ? 0.5 * x / 0.7 : 0.5 + 0.5 * (x - 0.7) / 0.3; }, 0.3},
-                 {"half wave", [](double x) { return 0.5 - 0.5 * std::cos(pi * x); }, 0.5}};
-    const cv::Size size(500, 400);
-    constexpr double period = 40;
-    for (const auto& [name, degree, latewood] : cases) {
-        const auto place = [](double x, double y) {
-            const double r = std::hypot(x + 700, y - 150) + 2 * std::sin(y / 20);
-            return r / period - std::floor(r / period);
-        };
-        cv::Mat pixels(size, CV_32F), grain(size, CV_32F);
-        for (int y = 0; y < size.height; ++y)
-            for (int x = 0; x < size.width; ++x) {
-                double sum = 0;
-                for (int i = 0; i < 25; ++i) sum += degree(place(x + (i % 5 - 2) / 5.0, y + (i / 5 - 2) / 5.0)) / 25;
-                pixels.at<float>(y, x) = static_cast<float>((190 - 110 * sum) * (0.9 + 0.2 * x / size.width));
-            }
-        cv::GaussianBlur(pixels, pixels, {}, 0.7);
-        cv::RNG(7).fill(grain, cv::RNG::NORMAL, 0, 0.05 * 255);
-        pixels += grain;
-        pixels.convertTo(pixels, CV_8U);
-        const Specimen specimen = segment_pixels(pixels, {.growth = GrowthAxis::right}).specimen;
-        EXPECT_GE(specimen.rings.size(), 11u) << name;
-        double worst = 0, sum = 0, right = 0;
-        for (const RingFigures& ring : specimen.rings) {
-            worst = std::max(worst, std::abs(ring.latewood_fraction - latewood));
-            sum += ring.latewood_fraction - latewood;
-        }
-        for (int y = 0; y < size.height; ++y)
-            for (int x = 0; x < size.width; ++x)
-                right += specimen.label[static_cast<std::size_t>(y * size.width + x)] == (place(x, y) >= 1 - latewood);
-        const double share = right / static_cast<double>(size.area());
-        std::printf("%s: LW fraction mean %+.2f, worst %.2f %%; classes %.2f %% right\n", name,
-                    100 * sum / static_cast<double>(specimen.rings.size()), 100 * worst, 100 * share);
-        EXPECT_LT(worst, 0.02) << name;
-        EXPECT_GT(share, 0.97) << name;
     }
 }
 
