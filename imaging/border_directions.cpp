@@ -162,8 +162,9 @@ double angle_at(const std::vector<const Traced*>& covering, int u, double v, dou
 cv::Mat without_waves(const cv::Mat& map, double step, double ring_width) {
     constexpr double rings = 2, nodes = 4;  // of its Gaussian; of a coarser lattice to a ring, which is as good
     const double scale = std::min(1.0, nodes * step / ring_width), sigma = rings * ring_width / step * scale;
+    const auto coarse = [scale](int size) { return std::max(1, cvRound(scale * size)); };
     cv::Mat small, smooth;
-    cv::resize(map, small, {}, scale, scale, cv::INTER_AREA);
+    cv::resize(map, small, {coarse(map.cols), coarse(map.rows)}, 0, 0, cv::INTER_AREA);
     cv::GaussianBlur(small, small, {}, sigma, sigma, cv::BORDER_REFLECT);
     cv::resize(small, smooth, map.size(), 0, 0, cv::INTER_LINEAR);
     return smooth;

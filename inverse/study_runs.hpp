@@ -35,7 +35,6 @@ class StudyRuns {
 
     bool only_toughness() const { return only_toughness_; }
     bool by_walks() const { return by_walks_; }
-    int threads() const { return threads_; }
     const KeptWalks& walks() const { return walks_; }
     const Nearby& nearby() const { return nearby_; }
     const StudyModel& model() const { return model_; }

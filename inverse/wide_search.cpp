@@ -45,7 +45,8 @@ std::string WideSearch::method() const {
     if (!runs_) {
         return "";
     }
-    return fmt::format(" Before that, {} runs on cells twice as wide found where to begin.", runs_->objective().runs().size());
+    return fmt::format(" Before that, {} runs on cells twice as wide found {}.", runs_->objective().runs().size(),
+                       runs_->objective().best() ? "where to begin" : "no point to begin from");
 }
 
 Evaluation WideSearch::at(const Eigen::VectorXd& x) {

@@ -177,6 +177,19 @@ TEST(UnitDrawnRings, WavesDoNotTellTheGrowth) {
     }
 }
 
+// Strips much narrower than a ring, as a thin core shows them, along both axes.
+TEST(UnitDrawnRings, AStripNarrowerThanARing) {
+    const auto gray = [](double x, double) { return x / 200 - std::floor(x / 200) < 0.7 ? 190.0 : 80.0; };
+    const cv::Mat along = drawn({900, 20}, gray, 0.7, 5);
+    for (const cv::Mat& pixels : {along, cv::Mat(along.t())}) {
+        const GrowthAxis growth = pixels.cols > pixels.rows ? GrowthAxis::right : GrowthAxis::down;
+        const Specimen specimen = segment_pixels(pixels, {.growth = growth}).specimen;
+        EXPECT_EQ(specimen.borders.size(), 4u);
+        EXPECT_EQ(specimen.rings.size(), 3u);
+        for (const RingFigures& ring : specimen.rings) EXPECT_NEAR(ring.latewood_fraction, 0.3, 0.02);
+    }
+}
+
 // A ring's mean gray through a blur that is known: its integral is. The tolerance is half a step and what half a gray's noise
 // does.
 TEST(UnitRingProfile, SharpenedIsAsBeforeTheBlur) {
