@@ -77,8 +77,7 @@ CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& p
 }
 
 const std::vector<MaterialSlope>& CutOutWood::slopes_by(const std::vector<MaterialSlope>& numbers) {
-    if (slopes_.empty())
-        for (const MaterialSlope& number : numbers) slopes_.emplace_back(number, body, box.low);
+    if (slopes_.empty()) slopes_ = MaterialSlope::of(numbers, body, box.low);
     return slopes_;
 }
 

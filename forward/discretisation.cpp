@@ -180,16 +180,27 @@ Change Discretisation::change_between(int p, int other) const {
 // Wood is averaged over the cell and not over each point: within a cell the strain can hardly jump from point to point, and
 // layers that share it would act too stiff across. Where in the cell each wood lies is told apart (`uneven_cells`).
 LocalWood Discretisation::wood_of_cell(const MaterialMap& materials, int c) const {
-    return materials.average(layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell);
+    WoodArea area = area_of_cell(c);
+    return materials.average(area);
+}
+
+namespace {
+
+// Of places in so many points a side, for the same second moment.
+Vec2 spread_of(const Vec2& points) { return (1.0 - points.array().square().inverse()).sqrt(); }
+
+}  // namespace
+
+Unevenness Discretisation::unevenness_of(const MaterialMap& materials, WoodArea& cell, const LocalWood& average) const {
+    return materials.unevenness(cell, average, spread_of(Vec2::Constant(layout.per_side)));
 }
 
 Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box,
                                          const LocalWood& average) const {
     const Vec2 wide(box.to_x - box.from_x, box.to_y - box.from_y);
     const Vec2 half = 0.5 * wide.cwiseProduct(layout.point_size());
-    const Vec2 centre = layout.cell_corner(c) + layout.point_size().cwiseProduct(Vec2(box.from_x, box.from_y)) + half;
-    const Vec2 spread = (1.0 - wide.array().square().inverse()).sqrt();
-    return materials.unevenness(centre, half, average, spread);
+    WoodArea area{layout.cell_corner(c) + layout.point_size().cwiseProduct(Vec2(box.from_x, box.from_y)) + half, half};
+    return materials.unevenness(area, average, spread_of(wide));
 }
 
 void Discretisation::place_points(const Scene& scene, const MaterialMap& materials) {
@@ -203,7 +214,8 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
     const Extent extent(scene.specimen);
     for (int c = 0; c < layout.cells(); ++c) {
         points.first_of_cell.push_back(points.count());
-        const LocalWood wood = wood_of_cell(materials, c);
+        WoodArea area = area_of_cell(c);
+        const LocalWood wood = materials.average(area);
         const Eigen::Matrix3d C = wood.elasticity.stiffness();
         points.stiffness.push_back({C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)});
         const auto nodes = layout.cell_nodes(c);
@@ -235,7 +247,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         }
         cell_is_full_[c] = filled > (1.0 - 1e-9) * whole;
         if (!cell_is_full_[c] || !wood.mixed || layout.degree > 1) continue;
-        const Unevenness uneven = unevenness_of(materials, c, {0, 0, layout.per_side, layout.per_side}, wood);
+        const Unevenness uneven = unevenness_of(materials, area, wood);
         if (!uneven.isZero()) uneven_cells.push_back({c, uneven});
     }
     points.first_of_cell.push_back(points.count());

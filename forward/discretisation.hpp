@@ -68,7 +68,12 @@ class PointTable {
 
     std::span<Value> operator[](int p) { return {values_.data() + static_cast<std::size_t>(p) * width_, width_}; }
     std::span<const Value> operator[](int p) const { return {values_.data() + static_cast<std::size_t>(p) * width_, width_}; }
-    bool same(int p, int q) const { return std::ranges::equal((*this)[p], (*this)[q]); }
+    bool same(int p, int q) const {
+        const Value *a = &values_[p * width_], *b = &values_[q * width_];
+        std::size_t k = 0;
+        while (k < width_ && a[k] == b[k]) ++k;
+        return k == width_;
+    }
     void resize(int points) { values_.resize(static_cast<std::size_t>(points) * width_); }
     void add(std::span<const Value> row) { values_.insert(values_.end(), row.begin(), row.end()); }
 
@@ -155,9 +160,11 @@ class Discretisation {
     int place_of(int p) const { return points.slot[p] % layout.points_per_cell(); }  // in its cell, row by row
     /// Shape functions of the nodes that a cell sees at x, which may lie outside the cell: they go on as they do in it.
     std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
-    bool cell_is_full(int c) const { return cell_is_full_[c]; }         // nothing of it is cut out or void
-    int point_at(const Vec2& x) const;                                  // the point whose domain holds x, or -1
-    LocalWood wood_of_cell(const MaterialMap& materials, int c) const;  // on average
+    bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
+    int point_at(const Vec2& x) const;                           // the point whose domain holds x, or -1
+    WoodArea area_of_cell(int c) const { return {layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell}; }
+    LocalWood wood_of_cell(const MaterialMap& materials, int c) const;                                       // on average
+    Unevenness unevenness_of(const MaterialMap& materials, WoodArea& cell, const LocalWood& average) const;  // of a full one
     Unevenness unevenness_of(const MaterialMap& materials, int c, const PointBox& box,
                              const LocalWood& average) const;  // a piece of a full cell
     int neighbour(int p, int step_x, int step_y) const;        // the point that many places away, or -1

@@ -140,7 +140,7 @@ void Equilibrium::find_forces() {
     potential_.reset();
     force_.assign(displacement_.size(), Vec2::Zero());
     reaction_.assign(boundary_.drivers(), Vec2::Zero());
-    internal_force_.add(displacement_, force_);
+    points_energy_ = internal_force_.add_with_energy(displacement_, force_);
     face_energy_ = face_dissipated_;
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
@@ -440,7 +440,7 @@ void Equilibrium::refine() {
 }
 
 double Equilibrium::strain_energy() const {
-    double energy = internal_force_.energy(displacement_);
+    double energy = history_ ? internal_force_.energy(displacement_) : points_energy_;  // settled since then
     for (const FieldPair& pair : cracks_.pairs)
         energy += 0.5 * shared_tie(pair, mass_) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
     return energy;

@@ -197,6 +197,7 @@ class Equilibrium {
     std::vector<Vec2> force_;         // out of balance [N]
 
     std::vector<Vec2> reaction_;               // [drivers] [N]
+    double points_energy_ = 0;                 // as the forces were found [J]
     double least_force_ = 0;                   // [N]
     double contact_energy_ = 0;                // [J]
     double face_energy_ = 0;                   // [J]

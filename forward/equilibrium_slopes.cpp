@@ -90,40 +90,11 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     slope.fields = Eigen::MatrixXd::Zero(2 * displacement_.size(), numbers.size());
     slope.drivers = Eigen::MatrixXd::Zero(2 * boundary_.drivers(), numbers.size());
     const auto add = [&](std::size_t n, int field, const Vec2& force) { slope.fields.col(n).segment<2>(2 * field) += force; };
-    std::vector<std::size_t> change;  // numbers that change the wood of a cell
-    for (int c = 0; c < body_.layout.cells(); ++c) {
-        change.clear();
-        for (std::size_t n = 0; n < numbers.size(); ++n)
-            if (!numbers[n].stiffness(c).isZero(0.0)) change.push_back(n);
-        if (change.empty()) continue;
-        for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) {
-            const Mat2 gradient = gradient_at(body_, p, displacement_);
-            const CellWeights& w = body_.weights[points.slot[p]];
-            const auto node = points.node[p];
-            for (const std::size_t n : change) {
-                const PointState state = elastic_state(gradient, numbers[n].stiffness(c), plan_.rotates);
-                slope.potential[n] += points.volume[p] * state.energy;
-                for (int k = 0; k < 4; ++k) add(n, node[k], points.volume[p] * (state.stress * Vec2(w.slope_x[k], w.slope_y[k])));
-            }
-        }
-    }
-    for (const UnevenCells::Piece& piece : internal_force_.uneven().pieces()) {
-        for (std::size_t n = 0; n < numbers.size(); ++n) {
-            if (numbers[n].stiffness(piece.cell).isZero(0.0)) continue;
-            const UnevenCells::State state =
-                internal_force_.uneven().state(piece, numbers[n].unevenness(piece.cell, piece.box), displacement_);
-            slope.potential[n] += state.energy;
-            for (int k = 0; k < 4; ++k) add(n, points.node[piece.point][k], state.force.segment<2>(2 * k));
-        }
-    }
-    for (const InternalForce::Alone& alone : internal_force_.alone()) {
-        const Vec2 cross = internal_force_.crosswise(alone.point, displacement_);
-        for (std::size_t n = 0; n < numbers.size(); ++n) {
-            const Eigen::Matrix3d& C = numbers[n].stiffness(points.cell[alone.point]);
-            const Vec2 pull = internal_force_.crosswise_stiffness(alone.point, C) * cross;
-            slope.potential[n] += 0.5 * pull.dot(cross);
-            for (int k = 0; k < 4; ++k) add(n, points.node[alone.point][k], crosswise_sign[k] * pull);
-        }
+    std::vector<Vec2> of_points;
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+        of_points.assign(displacement_.size(), Vec2::Zero());
+        slope.potential[n] = internal_force_.add_slope(numbers[n], displacement_, of_points);
+        slope.fields.col(n) = -Eigen::Map<const Eigen::VectorXd>(of_points.data()->data(), slope.fields.rows());
     }
     // Ties and closed faces are as stiff as their wood.
     for (const FieldPair& pair : cracks_.pairs) {

@@ -148,6 +148,7 @@ void Discretisation::find_facets(const Scene& scene) {
 
 // The voids of a picture have no smooth outline: there the points' own faces are the surface.
 void Discretisation::add_void_facets(const SpecimenPlan& specimen) {
+    if (points.lattice.size() == static_cast<std::size_t>(points.count())) return;  // there are none
     const Box rectangle{Vec2::Zero(), layout.size()};
     const Vec2 size = layout.point_size();
     for (int p = 0; p < points.count(); ++p) {

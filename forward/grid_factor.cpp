@@ -22,7 +22,7 @@ constexpr int leaf_cells = 4;  // boxes no wider than this are not halved: measu
 // Below this many unknowns a call into the BLAS costs more than the work: measured.
 constexpr int small_front = 48;
 
-// So many right sides are solved one after the other.
+// So many right sides are solved without the BLAS.
 constexpr int few_columns = 3;
 
 // Runs two tasks side by side, or one after the other.
@@ -135,6 +135,8 @@ void GridFactor::assemble_leaf(Box& box, const Assemble& assemble, Scratch& scra
             local[first_[node] + e] = box.offset[k] + e;
         }
     }
+    box.factor.setZero();
+    box.left.setZero();
     for (const Element& element : scratch.elements) {
         std::array<int, 8> at;
         for (int a = 0; a < 8; ++a) at[a] = element.equation[a] < 0 ? -1 : local[element.equation[a]];
@@ -153,12 +155,13 @@ double* GridFactor::column_of(Box& box, int c) {
     return box.left.data() + static_cast<std::ptrdiff_t>(c - box.inner) * box.border - box.inner;
 }
 
-// Adds what a half has left. Nodes that follow each other in both are taken together.
-void GridFactor::take_in(Box& box, int h) const {
+// Equations that follow each other both in what a half has left and in the front of its parent.
+struct GridFactor::Run {
+    int from, to, length;
+};
+
+std::vector<GridFactor::Run> GridFactor::runs(const Box& box, int h) const {
     const Box& half = boxes_[box.half[h]];
-    struct Run {
-        int from, to, length;
-    };
     std::vector<Run> runs;
     int at = 0;
     for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
@@ -168,13 +171,27 @@ void GridFactor::take_in(Box& box, int h) const {
         else runs.push_back({at, to, length});
         at += length;
     }
-    for (std::size_t r = 0; r < runs.size(); ++r) {
-        for (int c = 0; c < runs[r].length; ++c) {
-            const double* from = half.left.data() + static_cast<std::ptrdiff_t>(runs[r].from + c) * half.border;
-            double* to = column_of(box, runs[r].to + c);
+    return runs;
+}
+
+// The front of a box is what its halves have left. Column by column, so that each is at hand.
+void GridFactor::take_in_halves(Box& box) const {
+    const std::array<std::vector<Run>, 2> of_half{runs(box, 0), runs(box, 1)};
+    std::array<std::size_t, 2> at{0, 0};
+    for (int c = 0; c < box.offset.back(); ++c) {
+        double* to = column_of(box, c);
+        std::fill(to + c, to + box.offset.back(), 0.0);
+        for (int h = 0; h < 2; ++h) {
+            const std::vector<Run>& runs = of_half[h];
+            std::size_t& r = at[h];
+            while (r < runs.size() && runs[r].to + runs[r].length <= c) ++r;
+            if (r == runs.size() || runs[r].to > c) continue;
+            const Box& half = boxes_[box.half[h]];
+            const int column = runs[r].from + c - runs[r].to;
+            const double* from = half.left.data() + static_cast<std::ptrdiff_t>(column) * half.border;
             for (std::size_t below = r; below < runs.size(); ++below) {
                 const Run& rows = runs[below];
-                for (int i = below == r ? c : 0; i < rows.length; ++i) to[rows.to + i] += from[rows.from + i];
+                for (int i = below == r ? c - rows.to : 0; i < rows.length; ++i) to[rows.to + i] += from[rows.from + i];
             }
         }
     }
@@ -223,10 +240,8 @@ bool GridFactor::factor_box(Box& box, const Assemble& assemble, Scratch& scratch
     box.border = offset.back() - box.inner;
     box.factor.resize(offset.back(), box.inner);
     box.left.resize(box.border, box.border);
-    for (int c = 0; c < box.inner; ++c) box.factor.col(c).tail(offset.back() - c).setZero();
-    for (int c = 0; c < box.border; ++c) box.left.col(c).tail(box.border - c).setZero();
     if (box.half[0] < 0) assemble_leaf(box, assemble, scratch);
-    for (int h = 0; h < 2 && box.half[0] >= 0; ++h) take_in(box, h);
+    else take_in_halves(box);
     if (!eliminate(box)) return false;
     box.stale = false;
     return true;
@@ -286,79 +301,122 @@ void GridFactor::downward(int top, int forks, const Visit& visit) const {
         true, [&] { downward(half[0], forks - 1, visit); }, [&] { downward(half[1], forks - 1, visit); });
 }
 
-// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. Four columns at
-// a time: most of the work is to fetch them.
-void GridFactor::forward_columns(const Eigen::MatrixXd& factor, double* y) {
+// y := L^-1 y for the columns of a box's factor, and what they leave at its border: y of the border less L_bi y. For `sides`
+// right sides that follow each other. Four columns at a time: most of the work is to fetch them.
+void GridFactor::forward_columns(const Eigen::MatrixXd& factor, double* y, int sides) {
     const auto rows = factor.rows(), columns = factor.cols();
     for (Eigen::Index c = 0; c < columns;) {
         const auto width = std::min<Eigen::Index>(4, columns - c);
-        for (Eigen::Index a = c; a < c + width; ++a) {
-            y[a] /= factor(a, a);
-            for (Eigen::Index r = a + 1; r < c + width; ++r) y[r] -= factor(r, a) * y[a];
-        }
-        if (width == 4) {
-            const double *l0 = &factor(0, c), *l1 = l0 + rows, *l2 = l1 + rows, *l3 = l2 + rows;
-            const double y0 = y[c], y1 = y[c + 1], y2 = y[c + 2], y3 = y[c + 3];
-            for (Eigen::Index r = c + 4; r < rows; ++r) y[r] -= l0[r] * y0 + l1[r] * y1 + l2[r] * y2 + l3[r] * y3;
-        } else {
-            for (Eigen::Index a = c; a < c + width; ++a)
-                for (Eigen::Index r = c + width; r < rows; ++r) y[r] -= factor(r, a) * y[a];
+        double* v = y;
+        for (int side = 0; side < sides; ++side, v += rows) {
+            for (Eigen::Index a = c; a < c + width; ++a) {
+                v[a] /= factor(a, a);
+                for (Eigen::Index r = a + 1; r < c + width; ++r) v[r] -= factor(r, a) * v[a];
+            }
+            if (width == 4) {
+                const double *l0 = &factor(0, c), *l1 = l0 + rows, *l2 = l1 + rows, *l3 = l2 + rows;
+                const double v0 = v[c], v1 = v[c + 1], v2 = v[c + 2], v3 = v[c + 3];
+                for (Eigen::Index r = c + 4; r < rows; ++r) v[r] -= l0[r] * v0 + l1[r] * v1 + l2[r] * v2 + l3[r] * v3;
+            } else {
+                for (Eigen::Index a = c; a < c + width; ++a)
+                    for (Eigen::Index r = c + width; r < rows; ++r) v[r] -= factor(r, a) * v[a];
+            }
         }
         c += width;
     }
 }
 
 // The other way: y := L^-T (y - L_bi^T y of the border).
-void GridFactor::backward_columns(const Eigen::MatrixXd& factor, double* y) {
+void GridFactor::backward_columns(const Eigen::MatrixXd& factor, double* y, int sides) {
+    using Lane = Eigen::Array<double, 4, 1>;
     const auto rows = factor.rows(), columns = factor.cols();
     for (Eigen::Index end = columns; end > 0;) {
         const auto width = end % 4 == 0 ? 4 : end % 4;
         const auto c = end - width;
-        const auto below = Eigen::Map<const Eigen::VectorXd>(y + end, rows - end);
-        if (width == 4) {
-            const Eigen::Vector4d sum = factor.block<Eigen::Dynamic, 4>(end, c, rows - end, 4).transpose() * below;
-            for (int a = 0; a < 4; ++a) y[c + a] -= sum[a];
-        } else {
-            for (Eigen::Index a = c; a < end; ++a) y[a] -= factor.col(a).tail(rows - end).dot(below);
-        }
-        for (Eigen::Index a = end - 1; a >= c; --a) {
-            for (Eigen::Index r = a + 1; r < end; ++r) y[a] -= factor(r, a) * y[r];
-            y[a] /= factor(a, a);
+        double* v = y;
+        for (int side = 0; side < sides; ++side, v += rows) {
+            if (width == 4) {
+                const double *l0 = &factor(0, c), *l1 = l0 + rows, *l2 = l1 + rows, *l3 = l2 + rows;
+                Lane s0 = Lane::Zero(), s1 = Lane::Zero(), s2 = Lane::Zero(), s3 = Lane::Zero();
+                Eigen::Index r = end;
+                for (; r + 4 <= rows; r += 4) {
+                    const auto four = [r](const double* from) { return Eigen::Map<const Lane>(from + r); };
+                    const Lane below = four(v);
+                    s0 += four(l0) * below;
+                    s1 += four(l1) * below;
+                    s2 += four(l2) * below;
+                    s3 += four(l3) * below;
+                }
+                Lane sum(s0.sum(), s1.sum(), s2.sum(), s3.sum());
+                for (; r < rows; ++r) sum += v[r] * Lane(l0[r], l1[r], l2[r], l3[r]);
+                for (int a = 0; a < 4; ++a) v[c + a] -= sum[a];
+            } else {
+                const auto below = Eigen::Map<const Eigen::VectorXd>(v + end, rows - end);
+                for (Eigen::Index a = c; a < end; ++a) v[a] -= factor.col(a).tail(rows - end).dot(below);
+            }
+            for (Eigen::Index a = end - 1; a >= c; --a) {
+                for (Eigen::Index r = a + 1; r < end; ++r) v[a] -= factor(r, a) * v[r];
+                v[a] /= factor(a, a);
+            }
         }
         end = c;
     }
 }
 
-// One right side.
-void GridFactor::solve_one(Eigen::Ref<Eigen::MatrixXd> right) const {
-    double* x = right.data();
+void GridFactor::solve_few(Eigen::Ref<Eigen::MatrixXd> right) const {
+    const int sides = static_cast<int>(right.cols());
     std::vector<std::size_t> at(boxes_.size() + 1, 0);
-    for (std::size_t b = 0; b < boxes_.size(); ++b) at[b + 1] = at[b] + boxes_[b].inner + boxes_[b].border;
-    std::vector<double> fronts(at.back());  // of each box: its own unknowns, then what it leaves for the box that it is a half of
+    for (std::size_t b = 0; b < boxes_.size(); ++b)
+        at[b + 1] = at[b] + static_cast<std::size_t>(sides) * (boxes_[b].inner + boxes_[b].border);
+    // Of each box and right side: its own unknowns, then what it leaves for the box that it is a half of.
+    std::vector<double>& fronts = fronts_;
+    if (fronts.size() < at.back()) fronts.resize(at.back());
+    std::vector<char> counts(boxes_.size(), 0);  // whether there is anything but zeros in it
     const int top = static_cast<int>(boxes_.size()) - 1;
     upward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
+        const int size = box.inner + box.border;
         double* y = &fronts[at[b]];
-        if (box.inner > 0) std::copy_n(x + first_[box.nodes[0]], box.inner, y);
-        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
-            const double* from = &fronts[at[box.half[h]]] + boxes_[box.half[h]].inner;
-            for (const int slot : box.slot[h])
-                for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) y[to] += *from++;
+        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) counts[b] = counts[b] || counts[box.half[h]];
+        for (int side = 0; side < sides && box.inner > 0; ++side) {
+            const double* x = &right(first_[box.nodes[0]], side);
+            counts[b] = counts[b] || std::any_of(x, x + box.inner, [](double value) { return value != 0.0; });
         }
-        if (std::any_of(y, y + box.inner, [](double value) { return value != 0.0; })) forward_columns(box.factor, y);
-        if (box.inner > 0) std::copy_n(y, box.inner, x + first_[box.nodes[0]]);
+        if (!counts[b]) return;
+        for (int side = 0; side < sides; ++side) {
+            double* border = y + side * size;
+            if (box.inner > 0) border = std::copy_n(&right(first_[box.nodes[0]], side), box.inner, border);
+            std::fill_n(border, box.border, 0.0);
+        }
+        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
+            if (!counts[box.half[h]]) continue;
+            const Box& half = boxes_[box.half[h]];
+            const double* from = &fronts[at[box.half[h]]];
+            for (int side = 0; side < sides; ++side) {
+                from += half.inner;
+                for (const int slot : box.slot[h])
+                    for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) y[side * size + to] += *from++;
+            }
+        }
+        if (box.inner == 0) return;
+        forward_columns(box.factor, y, sides);
+        for (int side = 0; side < sides; ++side) std::copy_n(y + side * size, box.inner, &right(first_[box.nodes[0]], side));
     });
     take_off_wide(right);
     downward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
-        double* y = &fronts[at[b]];
-        std::copy_n(x + first_[box.nodes[0]], box.inner, y);
-        double* border = y + box.inner;
-        for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
-            border = std::copy_n(x + first_[box.nodes[k]], count_[box.nodes[k]], border);
-        backward_columns(box.factor, y);
-        std::copy_n(y, box.inner, x + first_[box.nodes[0]]);
+        const int size = box.inner + box.border;
+        for (int side = 0; side < sides; ++side) {
+            double* y = &fronts[at[b]] + side * size;
+            const double* x = &right(0, side);
+            double* border = std::copy_n(x + first_[box.nodes[0]], box.inner, y);
+            for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
+                border = std::copy_n(x + first_[box.nodes[k]], count_[box.nodes[k]], border);
+        }
+        backward_columns(box.factor, &fronts[at[b]], sides);
+        for (int side = 0; side < sides; ++side)
+            std::copy_n(&fronts[at[b]] + side * size, box.inner, &right(first_[box.nodes[0]], side));
     });
 }
 
@@ -407,8 +465,9 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 }
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {
-    if (right.cols() > few_columns) return solve_columns(right);
-    for (Eigen::Index c = 0; c < right.cols(); ++c) solve_one(right.col(c));
+    if (right.size() == 0) return;
+    if (right.cols() > few_columns) solve_columns(right);
+    else solve_few(right);
 }
 
 Eigen::MatrixXd GridFactor::compliance(const Eigen::MatrixXd& right) const {

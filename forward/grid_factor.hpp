@@ -41,7 +41,7 @@ class GridFactor {
     /// Factors anew what has changed. False when it is not positive definite.
     bool factor(const Assemble& assemble);
 
-    /// Solves for right sides [equations x any number], in place.
+    /// Solves for right sides [equations x any number], in place. One call at a time.
     void solve(Eigen::MatrixXd& right) const;
 
     /// What right sides [equations x any number] do on each other's solutions, R^T A^-1 R, which takes half of a solution.
@@ -85,25 +85,28 @@ class GridFactor {
     void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
     void take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const;
     static double* column_of(Box& box, int c);
-    void take_in(Box& box, int half) const;
+    struct Run;
+    std::vector<Run> runs(const Box& box, int half) const;
+    void take_in_halves(Box& box) const;
     static bool eliminate(Box& box);
     template <class Visit>
     void upward(int top, int forks, const Visit& visit) const;
     template <class Visit>
     void downward(int top, int forks, const Visit& visit) const;
-    static void forward_columns(const Eigen::MatrixXd& factor, double* y);
-    static void backward_columns(const Eigen::MatrixXd& factor, double* y);
-    void solve_one(Eigen::Ref<Eigen::MatrixXd> right) const;
+    static void forward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
+    static void backward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
+    void solve_few(Eigen::Ref<Eigen::MatrixXd> right) const;
     std::vector<Eigen::MatrixXd> forward_many(Eigen::Ref<Eigen::MatrixXd> right) const;
     void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;
-    int placed_ = 0;                  // nodes that have a place
-    std::vector<Box> boxes_;          // halves before what they are halves of
-    std::vector<int> place_;          // [nodes]
-    std::vector<int> box_of_cell_;    // its leaf
-    std::vector<int> first_, count_;  // [nodes] equations
-    int forks_ = 0;                   // levels of the tree at which its halves go side by side
+    int placed_ = 0;                      // nodes that have a place
+    std::vector<Box> boxes_;              // halves before what they are halves of
+    std::vector<int> place_;              // [nodes]
+    std::vector<int> box_of_cell_;        // its leaf
+    std::vector<int> first_, count_;      // [nodes] equations
+    int forks_ = 0;                       // levels of the tree at which its halves go side by side
+    mutable std::vector<double> fronts_;  // room for a solution
 
     // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T)
     // L^-1, where Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).

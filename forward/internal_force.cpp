@@ -54,15 +54,32 @@ double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stif
     return 0.5 * points.volume[point] * both / (area * area);
 }
 
-Vec2 InternalForce::crosswise(int point, const std::vector<Vec2>& displacement) const {
-    Vec2 sum = Vec2::Zero();
-    for (int k = 0; k < 4; ++k) sum += crosswise_sign[k] * displacement[body_.points.node[point][k]];
-    return sum;
-}
+// The wood as it is, and its slope by a number.
+struct InternalForce::OwnWood {
+    const Discretisation& body;
+    const std::array<double, 6>& stiffness(int cell) const { return body.points.stiffness[cell]; }
+    const Unevenness& unevenness(const UnevenCells::Piece& piece) const { return *piece.wood; }
+    double of_alone(const Alone& alone) const { return alone.stiffness; }
+    static constexpr bool has(int) { return true; }
+};
 
-template <int Nodes, int PointsPerCell, bool Rotates>
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
-                                        std::vector<Vec2>* force) const {
+struct InternalForce::ChangeOfWood {
+    const InternalForce& force;
+    const MaterialSlope& number;
+    std::array<double, 6> stiffness(int cell) const {
+        const Eigen::Matrix3d& C = number.stiffness(cell);
+        return {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
+    }
+    const Unevenness& unevenness(const UnevenCells::Piece& piece) const { return number.unevenness(piece.cell, piece.box); }
+    double of_alone(const Alone& alone) const {
+        return force.crosswise_stiffness(alone.point, number.stiffness(force.body_.points.cell[alone.point]));
+    }
+    bool has(int cell) const { return !number.stiffness(cell).isZero(0.0); }
+};
+
+template <int Nodes, int PointsPerCell, bool Rotates, class Wood>
+double InternalForce::visit_cells_of(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
+                                     Wanted wanted, std::vector<Vec2>* force) const {
     using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
     const Points& points = body_.points;
     std::array<Lane, Nodes> slope_x, slope_y;
@@ -72,6 +89,7 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
     int known = -1;  // the first of the slots whose slopes these are
     double energy = 0.0;
     for (const int c : cells) {
+        if (!wood.has(c)) continue;
         const int first = points.first_of_cell[c];
         if (const int slot = points.slot[first]; slot != known) {
             known = slot;
@@ -91,7 +109,7 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
             yx += u.y() * slope_x[k];
             yy += u.y() * slope_y[k];
         }
-        const std::array<double, 6>& C = points.stiffness[c];
+        const std::array<double, 6>& C = wood.stiffness(c);
         Lane cosine, sine, scale, strain_xx, strain_yy, shear;
         if constexpr (Rotates) {  // elastic_state, written out for many points at once
             const Lane c_part = 2.0 + xx + yy;
@@ -110,10 +128,8 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
         const Lane local_xx = volume * (C[0] * strain_xx + C[1] * strain_yy + C[4] * shear);
         const Lane local_yy = volume * (C[1] * strain_xx + C[2] * strain_yy + C[5] * shear);
         const Lane local_xy = volume * (C[4] * strain_xx + C[5] * strain_yy + C[3] * shear);
-        if (!force) {
-            energy += 0.5 * (local_xx * strain_xx + local_yy * strain_yy + local_xy * shear).sum();
-            continue;
-        }
+        if (wanted != Wanted::forces) energy += 0.5 * (local_xx * strain_xx + local_yy * strain_yy + local_xy * shear).sum();
+        if (wanted == Wanted::energy) continue;
         Lane P_xx = local_xx, P_xy = local_xy, P_yx = local_xy, P_yy = local_yy;
         if constexpr (Rotates) {  // B^T s of Polar::strain_slope, turned
             const Lane skew = scale * (0.5 * shear * (local_yy - local_xx) + (strain_xx - strain_yy) * local_xy);
@@ -132,29 +148,28 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const std::v
     return energy;
 }
 
-template <int PointsPerCell>
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
-                                        std::vector<Vec2>* force) const {
-    const auto visit = [&]<int Nodes>() {
-        return rotates_ ? visit_whole_cells<Nodes, PointsPerCell, true>(cells, displacement, force)
-                        : visit_whole_cells<Nodes, PointsPerCell, false>(cells, displacement, force);
+template <class Wood>
+double InternalForce::visit_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
+                                  Wanted wanted, std::vector<Vec2>* force) const {
+    const auto visit = [&]<int Nodes, int PointsPerCell>() {
+        return rotates_ ? visit_cells_of<Nodes, PointsPerCell, true>(cells, wood, displacement, wanted, force)
+                        : visit_cells_of<Nodes, PointsPerCell, false>(cells, wood, displacement, wanted, force);
     };
-    return body_.layout.degree == 1 ? visit.template operator()<4>() : visit.template operator()<9>();
-}
-
-double InternalForce::visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement,
-                                        std::vector<Vec2>* force) const {
+    const auto with = [&]<int PointsPerCell>() {
+        return body_.layout.degree == 1 ? visit.template operator()<4, PointsPerCell>()
+                                        : visit.template operator()<9, PointsPerCell>();
+    };
     switch (body_.layout.per_side) {
     case 1:
-        return visit_whole_cells<1>(cells, displacement, force);
+        return with.template operator()<1>();
     case 2:
-        return visit_whole_cells<4>(cells, displacement, force);
+        return with.template operator()<4>();
     case 3:
-        return visit_whole_cells<9>(cells, displacement, force);
+        return with.template operator()<9>();
     case 4:
-        return visit_whole_cells<16>(cells, displacement, force);
+        return with.template operator()<16>();
     default:
-        return visit_whole_cells<25>(cells, displacement, force);
+        return with.template operator()<25>();
     }
 }
 
@@ -282,7 +297,7 @@ void InternalForce::add_stress(int p, const Mat2& stress, std::vector<Vec2>& for
         force[node[k]] -= body_.points.volume[p] * (stress * Vec2(w.slope_x[k], w.slope_y[k]));
 }
 
-double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement,
+double InternalForce::visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, Wanted wanted,
                                         std::vector<Vec2>* force) const {
     double energy = 0.0;
     for (const PointGroup& group : groups) {
@@ -290,10 +305,10 @@ double InternalForce::visit_remembering(std::span<const PointGroup> groups, cons
         std::array<Eigen::Vector3d, most_in_group> stresses;
         for (int i = 0; i < group.count; ++i) {
             const int p = group.first + i;
-            if (force) stresses[i] = history_->respond(p, seen.strain[i]).stress;
-            else energy += body_.points.volume[p] * history_->stored(p, seen.strain[i]);
+            if (wanted != Wanted::energy) stresses[i] = history_->respond(p, seen.strain[i]).stress;
+            if (wanted != Wanted::forces) energy += body_.points.volume[p] * history_->stored(p, seen.strain[i]);
         }
-        if (!force) continue;
+        if (wanted == Wanted::energy) continue;
         seen.share(stresses);
         for (int i = 0; i < group.count; ++i) {
             const auto stress = [&](const Eigen::Vector3d&) { return stresses[i]; };
@@ -303,45 +318,72 @@ double InternalForce::visit_remembering(std::span<const PointGroup> groups, cons
     return energy;
 }
 
-double InternalForce::visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const {
+template <class Wood>
+double InternalForce::visit(int strip, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                            std::vector<Vec2>* force) const {
     const Points& points = body_.points;
     const Place& from = first_of_strip_[strip];
     const Place& to = first_of_strip_[strip + 1];
+    const bool forces = wanted != Wanted::energy;
     const std::span<const int> cells(whole_cells_.data() + from.whole_cell, to.whole_cell - from.whole_cell);
-    double energy = visit_whole_cells(cells, displacement, force);
+    double energy = visit_cells(cells, wood, displacement, wanted, force);
     for (std::size_t i = from.loose_point; i < to.loose_point; ++i) {
         const int p = loose_points_[i];
-        const PointState state = elastic_state(gradient_at(body_, p, displacement), points.stiffness_of(p), rotates_);
+        if (!wood.has(points.cell[p])) continue;
+        const auto& C = wood.stiffness(points.cell[p]);
+        const PointState state =
+            elastic_state(gradient_at(body_, p, displacement),
+                          (Eigen::Matrix3d() << C[0], C[1], C[4], C[1], C[2], C[5], C[4], C[5], C[3]).finished(), rotates_);
         energy += points.volume[p] * state.energy;
-        if (force) add_stress(p, state.stress, *force);
+        if (forces) add_stress(p, state.stress, *force);
     }
     for (const UnevenCells::Piece& piece : uneven_.pieces(strips_.first_cell(strip), strips_.first_cell(strip + 1))) {
-        const UnevenCells::State state = uneven_.state(piece, *piece.wood, displacement);
+        if (!wood.has(piece.cell)) continue;
+        const UnevenCells::State state = uneven_.state(piece, wood.unevenness(piece), displacement);
         energy += state.energy;
-        for (int k = 0; k < 4 && force; ++k) (*force)[points.node[piece.point][k]] -= state.force.segment<2>(2 * k);
+        for (int k = 0; k < 4 && forces; ++k) (*force)[points.node[piece.point][k]] -= state.force.segment<2>(2 * k);
     }
-    energy += visit_remembering({remembering_.data() + from.remembering, to.remembering - from.remembering}, displacement, force);
     for (std::size_t i = from.alone; i < to.alone; ++i) {
-        const Alone& a = alone_[i];
-        const Vec2 apart = crosswise(a.point, displacement);
-        energy += 0.5 * a.stiffness * apart.squaredNorm();
-        for (int k = 0; k < 4 && force; ++k) (*force)[points.node[a.point][k]] -= crosswise_sign[k] * a.stiffness * apart;
+        const double stiffness = wood.of_alone(alone_[i]);
+        const auto node = points.node[alone_[i].point];
+        Vec2 apart = Vec2::Zero();  // u_0 - u_1 - u_2 + u_3
+        for (int k = 0; k < 4; ++k) apart += crosswise_sign[k] * displacement[node[k]];
+        energy += 0.5 * stiffness * apart.squaredNorm();
+        for (int k = 0; k < 4 && forces; ++k) (*force)[node[k]] -= crosswise_sign[k] * stiffness * apart;
     }
     return energy;
 }
 
 void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, Team& team) const {
-    strips_.each(team, [&](int strip) { visit(strip, displacement, &force); });
+    strips_.each(team, [&](int strip) {
+        visit(strip, OwnWood{body_}, displacement, Wanted::forces, &force);
+        visit_remembering(remembering_of(strip), displacement, Wanted::forces, &force);
+    });
 }
 
-void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
-    Team alone(1);
-    add(displacement, force, alone);
+double InternalForce::add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+    double sum = 0.0;
+    for (int strip = 0; strip < strips_.count(); ++strip) {
+        sum += visit(strip, OwnWood{body_}, displacement, Wanted::both, &force);
+        sum += visit_remembering(remembering_of(strip), displacement, Wanted::both, &force);
+    }
+    return sum;
+}
+
+double InternalForce::add_slope(const MaterialSlope& number, const std::vector<Vec2>& displacement,
+                                std::vector<Vec2>& force) const {
+    double sum = 0.0;
+    for (int strip = 0; strip < strips_.count(); ++strip)
+        sum += visit(strip, ChangeOfWood{*this, number}, displacement, Wanted::both, &force);
+    return sum;
 }
 
 double InternalForce::energy(const std::vector<Vec2>& displacement) const {
     double sum = 0.0;
-    for (int strip = 0; strip < strips_.count(); ++strip) sum += visit(strip, displacement, nullptr);
+    for (int strip = 0; strip < strips_.count(); ++strip) {
+        sum += visit(strip, OwnWood{body_}, displacement, Wanted::energy, nullptr);
+        sum += visit_remembering(remembering_of(strip), displacement, Wanted::energy, nullptr);
+    }
     return sum;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "forward/material_slope.hpp"
 #include "forward/seen_strain.hpp"
 #include "forward/strips.hpp"
 #include "forward/uneven_cells.hpp"
@@ -30,7 +31,13 @@ class InternalForce {
     void sort_cells();
 
     void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, Team& team) const;
-    void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;  // on one thread
+
+    /// On one thread. Returns the energy too [J].
+    double add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+
+    /// Adds what the slope of the wood by a number of the materials makes of the forces, and returns what it makes of the energy
+    /// [per the number's unit]. Where no wood remembers.
+    double add_slope(const MaterialSlope& number, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
 
     /// Second derivative of the energy of points that follow each other on the same fields, by these fields' displacements [N/m];
     /// `geometric` as in `elastic_tangent`.
@@ -42,10 +49,6 @@ class InternalForce {
     };
     const std::vector<Alone>& alone() const { return alone_; }
 
-    /// k of a point with this stiffness [N/m].
-    double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
-    Vec2 crosswise(int point, const std::vector<Vec2>& displacement) const;  // u_0 - u_1 - u_2 + u_3 [m]
-
     const UnevenCells& uneven() const { return uneven_; }
 
     /// Strain energy of all points; of those that remember as they were settled last [J].
@@ -56,16 +59,28 @@ class InternalForce {
         std::size_t whole_cell, loose_point, alone, remembering;
     };
 
-    // Adds the forces of a strip's points, or, without `force`, returns their strain energy [J].
-    double visit(int strip, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    template <int PointsPerCell>
-    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
-    template <int Nodes, int PointsPerCell, bool Rotates>
-    double visit_whole_cells(std::span<const int> cells, const std::vector<Vec2>& displacement, std::vector<Vec2>* force) const;
+    struct OwnWood;
+    struct ChangeOfWood;
+    enum class Wanted { forces, energy, both };
+
+    // Adds the forces of a strip's points where they are wanted, and returns their strain energy where that is [J].
+    template <class Wood>
+    double visit(int strip, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                 std::vector<Vec2>* force) const;
+    template <class Wood>
+    double visit_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                       std::vector<Vec2>* force) const;
+    template <int Nodes, int PointsPerCell, bool Rotates, class Wood>
+    double visit_cells_of(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                          std::vector<Vec2>* force) const;
+    double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
     Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
                                                    bool geometric) const;
-    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement,
+    std::span<const PointGroup> remembering_of(int strip) const {
+        const auto [from, to] = std::pair(first_of_strip_[strip].remembering, first_of_strip_[strip + 1].remembering);
+        return {remembering_.data() + from, to - from};
+    }
+    double visit_remembering(std::span<const PointGroup> groups, const std::vector<Vec2>& displacement, Wanted wanted,
                              std::vector<Vec2>* force) const;
     void add_stress(int point, const Eigen::Matrix2d& stress, std::vector<Vec2>& force) const;
     Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement,

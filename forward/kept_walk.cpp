@@ -10,7 +10,7 @@
 namespace crampfit {
 
 KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, int threads)
-    : scene_(scene), materials_(scene_), plan_(make_plan(scene_, materials_, Discretisation(scene_, materials_))),
+    : scene_(scene), materials_(scene_), body_(std::in_place, scene_, materials_), plan_(make_plan(scene_, materials_, *body_)),
       numbers_(numbers), threads_(threads) {
     reusable_ = plan_.quasistatic && growing_tips(scene_) <= 1 && !plan_.friction && !plan_.remembers;
     if (!has_slopes()) numbers_.clear();
@@ -19,8 +19,11 @@ KeptWalk::KeptWalk(const Scene& scene, const std::vector<std::string>& numbers, 
 Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool rough) {
     const auto start = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
-    if (!walk_ || !walk_->failure().empty())
-        walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, Discretisation(scene_, materials_), numbers_, threads_);
+    if (!walk_ || !walk_->failure().empty()) {
+        if (!body_) body_.emplace(scene_, materials_);
+        walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, *body_, numbers_, threads_);
+        body_.reset();
+    }
     const int known = walk_->equilibria();
     std::vector<double> by;
     for (const std::string& key : numbers_) {

@@ -40,6 +40,7 @@ class KeptWalk {
   private:
     Scene scene_;
     MaterialMap materials_;
+    std::optional<Discretisation> body_;  // for the first walk
     Plan plan_;
     std::vector<std::string> numbers_;
     int threads_ = 1;

@@ -9,7 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <unordered_map>
 
 namespace crampfit {
 
@@ -53,9 +53,50 @@ Rectangle rectangle(const Vec2& centre, const Vec2& half, const Vec2& spread) {
 
 }  // namespace
 
+// Wood by its grade between two materials, from a table of what `mix` makes: a cubic through four entries is within 1e-10 of it,
+// the moduli 1000 apart, and takes a tenth of the time.
+class MaterialMap::Transition {
+  public:
+    Transition(const MaterialMap& map, int first) {
+        for (int k = 0; k <= steps; ++k) {
+            const LocalWood wood = map.mix(first, first + 1, k / double{steps});
+            Entry& entry = entries_.emplace_back();
+            entry << wood.elasticity.coefficients, wood.poisson_ratios, wood.density, wood.toughness, wood.latewood, 0.0;
+        }
+    }
+
+    LocalWood at(double grade) const {
+        const double place = steps * grade;
+        const int first = std::clamp(static_cast<int>(place) - 1, 0, steps - 3);
+        const double t = place - first, a = t - 1.0, b = t - 2.0, c = t - 3.0;
+        const Entry* e = &entries_[first];
+        const Entry found = (t * (a * (b * e[3] / 6.0 - c * e[2] / 2.0) + b * c * e[1] / 2.0) - a * b * c / 6.0 * e[0]).eval();
+        LocalWood wood;
+        wood.elasticity.coefficients = found.head<6>();
+        wood.poisson_ratios = found.segment<2>(6);
+        wood.density = found[8];
+        wood.toughness = found[9];
+        wood.latewood = found[10];
+        wood.filled = 1.0;
+        return wood;
+    }
+
+  private:
+    static constexpr int steps = 1024;
+    using Entry = Eigen::Vector<double, 12>;  // the last of no use
+    std::vector<Entry> entries_;
+};
+
 struct MaterialMap::Known {
-    std::map<Rectangle, LocalWood> average;
-    std::map<Rectangle, Unevenness> unevenness;
+    struct Hash {
+        std::size_t operator()(const Rectangle& r) const {
+            std::size_t all = 0;
+            for (const std::int64_t number : r) all = (all ^ static_cast<std::size_t>(number)) * 0x9e3779b97f4a7c15u;
+            return all ^ (all >> 32);
+        }
+    };
+    std::unordered_map<Rectangle, LocalWood, Hash> average;
+    std::unordered_map<Rectangle, Unevenness, Hash> unevenness;
 };
 
 MaterialMap MaterialMap::part(const Vec2& corner) const {
@@ -86,6 +127,8 @@ MaterialMap::MaterialMap(const Scene& scene) : scene_(scene), known_(std::make_s
     remembers_ = std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.remembers(); });
     const bool graded = (plan.rings && plan.rings->transition > 0.0) || (plan.map && !plan.map->grade.empty());
     if (remembers_) check_memory(graded);
+    for (int k = 0; graded && k + 1 < static_cast<int>(materials_.size()); ++k)
+        transition_.push_back(std::make_shared<Transition>(*this, k));
     if (!orthotropic_) return;
     check_radial_direction();
     if (plan.pith) homogeneous_ = false;
@@ -162,15 +205,15 @@ Vec2 MaterialMap::radial_direction(const Vec2& x) const {
     return arm.isZero() ? Vec2::UnitX() : Vec2(arm.normalized());
 }
 
-LocalWood MaterialMap::in_rings(const Vec2& x) const {
+WoodArea::Sample MaterialMap::in_rings(const Vec2& x) const {
     const Rings& rings = *scene_.specimen.rings;
     const double turns = (x - rings.pith).norm() / rings.period;
     const double phase = turns - std::floor(turns);
     const double latewood_start = 1.0 - rings.latewood_fraction;
-    if (phase > latewood_start) return pure_[1];
+    if (phase > latewood_start) return {1};
     const double width = rings.transition / rings.period;
-    if (width > 0.0 && phase > latewood_start - width) return mix(0, 1, 1.0 - (latewood_start - phase) / width);
-    return pure_[0];
+    if (width > 0.0 && phase > latewood_start - width) return {0, 1.0 - (latewood_start - phase) / width};
+    return {0};
 }
 
 std::size_t MaterialMap::pixel_at(const Vec2& x) const {
@@ -182,29 +225,30 @@ std::size_t MaterialMap::pixel_at(const Vec2& x) const {
     return static_cast<std::size_t>(map.rows - 1 - up) * map.columns + column;
 }
 
-LocalWood MaterialMap::in_picture(const Vec2& x) const {
+WoodArea::Sample MaterialMap::in_picture(const Vec2& x) const {
     const Specimen& map = *scene_.specimen.map;
     const std::size_t at = pixel_at(x);
-    const int label = map.label[at];
-    if (label == Specimen::void_label) return {};
-    const double grade = map.grade.empty() ? 0.0 : map.grade[at];
-    LocalWood wood = grade > 0.0 ? mix(label, label + 1, grade) : pure_[label];
-    if (orthotropic_ && !map.orientation.empty()) {
-        const double c = std::cos(map.orientation[at]), s = std::sin(map.orientation[at]);
-        wood.elasticity.normal = {picture_cos_ * c - picture_sin_ * s, picture_sin_ * c + picture_cos_ * s};
-    } else if (orthotropic_) {
-        wood.elasticity.normal = radial_direction(x);
-    }
-    return wood;
+    if (map.label[at] == Specimen::void_label) return {};
+    WoodArea::Sample here{map.label[at], map.grade.empty() ? 0.0 : map.grade[at]};
+    if (!orthotropic_ || map.orientation.empty()) return here;
+    const double c = std::cos(map.orientation[at]), s = std::sin(map.orientation[at]);
+    here.radial = {picture_cos_ * c - picture_sin_ * s, picture_sin_ * c + picture_cos_ * s};
+    return here;
 }
 
-LocalWood MaterialMap::at(const Vec2& x) const { return at_place(x + corner_); }
+LocalWood MaterialMap::at(const Vec2& x) const { return wood_of(sample_at(x + corner_)); }
 
-LocalWood MaterialMap::at_place(const Vec2& x) const {
-    if (scene_.specimen.map) return in_picture(x);
-    if (homogeneous_) return pure_[0];
-    LocalWood wood = scene_.specimen.rings ? in_rings(x) : pure_[0];
-    if (orthotropic_) wood.elasticity.normal = radial_direction(x);
+WoodArea::Sample MaterialMap::sample_at(const Vec2& x) const {
+    WoodArea::Sample here = scene_.specimen.map ? in_picture(x) : scene_.specimen.rings ? in_rings(x) : WoodArea::Sample{0};
+    const bool mapped = scene_.specimen.map && !scene_.specimen.map->orientation.empty();
+    if (orthotropic_ && !mapped && here.wood >= 0) here.radial = radial_direction(x);
+    return here;
+}
+
+LocalWood MaterialMap::wood_of(const WoodArea::Sample& sample) const {
+    if (sample.wood < 0) return {};
+    LocalWood wood = sample.grade > 0.0 ? transition_[sample.wood]->at(sample.grade) : pure_[sample.wood];
+    if (orthotropic_) wood.elasticity.normal = sample.radial;
     return wood;
 }
 
@@ -286,7 +330,7 @@ std::vector<double> MaterialMap::shares(const Vec2& middle, const Vec2& half) co
     double filled = 0.0;
     for (int k = 0; k < samples * samples; ++k) {
         const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
-        const LocalWood here = at_place(centre + place.cwiseProduct(half));
+        const LocalWood here = wood_of(sample_at(centre + place.cwiseProduct(half)));
         if (here.filled == 0.0) continue;
         shares[here.material] += 1.0;
         filled += 1.0;
@@ -296,42 +340,56 @@ std::vector<double> MaterialMap::shares(const Vec2& middle, const Vec2& half) co
 }
 
 LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
+    WoodArea area{centre, half};
+    return average(area);
+}
+
+LocalWood MaterialMap::average(WoodArea& area) const {
     if (homogeneous_) return pure_[0];
-    const Vec2 x = centre + corner_;
-    if (const LocalWood* wood = band_around(x, half)) return *wood;
-    if (!is_part_) return find_average(x, half);
-    const auto [known, missing] = known_->average.try_emplace(rectangle(x, half, Vec2::Zero()));
-    if (missing) known->second = find_average(x, half);
+    const Vec2 x = area.centre + corner_;
+    if (const LocalWood* wood = band_around(x, area.half)) return *wood;
+    if (!is_part_) return find_average(area);
+    const auto [known, missing] = known_->average.try_emplace(rectangle(x, area.half, Vec2::Zero()));
+    if (missing) known->second = find_average(area);
     return known->second;
 }
 
-LocalWood MaterialMap::find_average(const Vec2& centre, const Vec2& half) const {
-    const int samples = samples_a_side(half);
+// How many samples an area has a side.
+int MaterialMap::sample(WoodArea& area) const {
+    const int side = samples_a_side(area.half);
+    if (!area.samples.empty()) return side;
+    area.samples.reserve(side * side);
+    for (int k = 0; k < side * side; ++k) {
+        const Vec2 place((2.0 * (k % side) + 1.0) / side - 1.0, (2.0 * (k / side) + 1.0) / side - 1.0);
+        area.samples.push_back(sample_at(area.centre + corner_ + place.cwiseProduct(area.half)));
+    }
+    return side;
+}
+
+LocalWood MaterialMap::find_average(WoodArea& area) const {
+    const int samples = sample(area);
     LocalWood sum;
     std::vector<LayeredElasticity> elasticities;  // of orthotropic wood
     double least = 1.0, most = 0.0;               // latewood: layers lie as it does, whatever the moduli
-    for (int j = 0; j < samples; ++j) {
-        for (int i = 0; i < samples; ++i) {
-            const Vec2 place((2.0 * i + 1.0) / samples - 1.0, (2.0 * j + 1.0) / samples - 1.0);
-            const LocalWood here = at_place(centre + place.cwiseProduct(half));
-            if (here.filled > 0.0) {
-                least = std::min(least, here.latewood);
-                most = std::max(most, here.latewood);
-            }
-            sum.elasticity.coefficients += here.elasticity.coefficients;
-            if (orthotropic_) elasticities.push_back(here.elasticity);
-            sum.density += here.density;
-            sum.toughness += here.toughness;
-            sum.poisson_ratios += here.poisson_ratios;
-            sum.latewood += here.latewood;
-            sum.filled += here.filled;
+    for (const WoodArea::Sample& one : area.samples) {
+        const LocalWood here = wood_of(one);
+        if (here.filled > 0.0) {
+            least = std::min(least, here.latewood);
+            most = std::max(most, here.latewood);
         }
+        sum.elasticity.coefficients += here.elasticity.coefficients;
+        if (orthotropic_) elasticities.push_back(here.elasticity);
+        sum.density += here.density;
+        sum.toughness += here.toughness;
+        sum.poisson_ratios += here.poisson_ratios;
+        sum.latewood += here.latewood;
+        sum.filled += here.filled;
     }
     if (sum.filled == 0.0) return sum;
     const double share = 1.0 / sum.filled;  // means over what is there; the void only thins the point
     sum.elasticity.coefficients *= share;
     sum.mixed = least < most;
-    const std::optional<Vec2> normal = sum.mixed ? std::optional(layer_normal(centre, half)) : std::nullopt;
+    const std::optional<Vec2> normal = sum.mixed ? std::optional(layer_normal(area.centre + corner_, area.half)) : std::nullopt;
     if (orthotropic_) average_elasticity(elasticities, samples, normal, sum.elasticity);
     else if (normal) sum.elasticity.normal = *normal;
     sum.density *= share;
@@ -342,68 +400,76 @@ LocalWood MaterialMap::find_average(const Vec2& centre, const Vec2& half) const 
     return sum;
 }
 
-Unevenness MaterialMap::unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const {
+Unevenness MaterialMap::unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {
     if (!average.mixed || average.filled < 1.0) return {};
-    const Vec2 x = centre + corner_;
-    if (!is_part_) return find_unevenness(x, half, average, spread);
-    const auto [known, missing] = known_->unevenness.try_emplace(rectangle(x, half, spread));
-    if (missing) known->second = find_unevenness(x, half, average, spread);
+    if (!is_part_) return find_unevenness(area, average, spread);
+    const auto [known, missing] = known_->unevenness.try_emplace(rectangle(area.centre + corner_, area.half, spread));
+    if (missing) known->second = find_unevenness(area, average, spread);
     return known->second;
 }
 
-Unevenness MaterialMap::find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average,
-                                        const Vec2& spread) const {
+Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {
     using Coefficients = LayeredElasticity::Coefficients;
-    const int samples = samples_a_side(half);
+    const int samples = sample(area);
     const Vec2 normal = average.elasticity.normal;
-    std::vector<Coefficients> wood;
-    for (int k = 0; k < samples * samples; ++k) {
-        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
-        const LocalWood here = at_place(centre + place.cwiseProduct(half));
-        wood.push_back(orthotropic_ ? layered(here.elasticity.stiffness(), normal).coefficients : here.elasticity.coefficients);
-    }
     const Coefficients of_average = average.elasticity.coefficients;
     const double no_other_wood = orthotropic_ ? 0.01 : 1e-12;  // grain that turns within the cell is none
-    const auto is_average = [&](const Coefficients& c) {
-        const Coefficients d = c - of_average;
-        return std::max({std::abs(d[0]) / of_average[0], std::abs(d[2]) / of_average[2], std::abs(d[3]) / of_average[3],
-                         std::abs(d[1])}) < no_other_wood;
-    };
-    if (std::all_of(wood.begin(), wood.end(), is_average)) return {};
+    bool all_alike = true;
     Coefficients mean = Coefficients::Zero();
-    for (const Coefficients& c : wood) mean += c / static_cast<double>(wood.size());
+    Eigen::Matrix<double, 3, 2> first = Eigen::Matrix<double, 3, 2>::Zero();              // means of E', r and p, times x and y
+    Eigen::Vector3d second = Eigen::Vector3d::Zero(), seconds = Eigen::Vector3d::Zero();  // of E' and of 1, times xx, xy, yy
+    const double share = 1.0 / (samples * samples);
+    for (int k = 0; k < samples * samples; ++k) {
+        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const LocalWood here = wood_of(area.samples[k]);
+        const Coefficients wood =
+            orthotropic_ ? layered(here.elasticity.stiffness(), normal).coefficients : here.elasticity.coefficients;
+        const Coefficients d = wood - of_average;
+        all_alike = all_alike && std::max({std::abs(d[0]) / of_average[0], std::abs(d[2]) / of_average[2],
+                                           std::abs(d[3]) / of_average[3], std::abs(d[1])}) < no_other_wood;
+        const Vec2 x = spread.cwiseProduct(area.half).cwiseProduct(place);
+        const Eigen::Vector3d xx(x.x() * x.x(), x.x() * x.y(), x.y() * x.y());
+        mean += share * wood;
+        first.col(0) += share * x.x() * Eigen::Vector3d(wood[0], wood[1], wood[4]);
+        first.col(1) += share * x.y() * Eigen::Vector3d(wood[0], wood[1], wood[4]);
+        second += share * wood[0] * xx;
+        seconds += share * xx;
+    }
+    if (all_alike) return {};
+    second -= mean[0] * seconds;
     // All in the axes n, s of the layers; strain is counted nn, ss, 2 ns.
     Eigen::Matrix3d turn;  // of strain, from x, y
     const double nx = normal.x(), ny = normal.y();
     turn << nx * nx, ny * ny, nx * ny, ny * ny, nx * nx, -nx * ny, -2.0 * nx * ny, 2.0 * nx * ny, nx * nx - ny * ny;
     const Eigen::Matrix3d C = LayeredElasticity{mean, Vec2::UnitX()}.stiffness();
     const Eigen::Matrix3d more = C - LayeredElasticity{of_average, Vec2::UnitX()}.stiffness();
-    Eigen::RowVector2d stretch = Eigen::RowVector2d::Zero();  // mean of E' b, with b q the strain e_ss of q
-    Eigen::Matrix2d contraction = Eigen::Matrix2d::Zero();    // means of r b and p b
-    Eigen::Matrix2d bending = Eigen::Matrix2d::Zero();
-    for (int k = 0; k < samples * samples; ++k) {
-        const double x = spread.x() * half.x() * ((2.0 * (k % samples) + 1.0) / samples - 1.0);
-        const double y = spread.y() * half.y() * ((2.0 * (k / samples) + 1.0) / samples - 1.0);
-        Eigen::Matrix<double, 3, 2> strain;  // of q
-        strain << y, 0, 0, x, x, y;
-        strain = turn * strain;
-        const Eigen::RowVector2d b = strain.row(1);
-        stretch += wood[k][0] * b;
-        contraction.row(0) += wood[k][1] * b;
-        contraction.row(1) += wood[k][4] * b;
-        bending += (wood[k][0] - mean[0]) * b.transpose() * b + strain.transpose() * more * strain;
-    }
-    const double share = 1.0 / (samples * samples);
-    contraction *= share;
+    // The strain of q, by x and by y; of it ss.
+    Eigen::Matrix<double, 3, 2> by_x, by_y;
+    by_x << 0, 0, 0, 1, 1, 0;
+    by_y << 1, 0, 0, 0, 0, 1;
+    by_x = turn * by_x;
+    by_y = turn * by_y;
+    const Eigen::RowVector2d along_x = by_x.row(1), along_y = by_y.row(1);
+    const Eigen::RowVector2d stretch = first(0, 0) * along_x + first(0, 1) * along_y;  // mean of E' b, with b q that strain
+    Eigen::Matrix2d contraction;                                                       // means of r b and p b
+    contraction << first(1, 0) * along_x + first(1, 1) * along_y, first(2, 0) * along_x + first(2, 1) * along_y;
+    // Mean of m S by x, y with moments m.
+    const auto squares = [](const auto& x, const auto& y, const auto& stiffness, const Eigen::Vector3d& moments) {
+        const Eigen::Matrix2d across = x.transpose() * stiffness * y;
+        return Eigen::Matrix2d(moments[0] * x.transpose() * stiffness * x + moments[1] * (across + across.transpose()) +
+                               moments[2] * y.transpose() * stiffness * y);
+    };
+    const Eigen::Matrix2d bending =
+        squares(along_x, along_y, Eigen::Matrix<double, 1, 1>(1.0), second) + squares(by_x, by_y, more, seconds);
     Eigen::Matrix<double, 2, 3> tractions;  // nn and ns, of strain
     tractions << C.row(0), C.row(2);
     Eigen::Matrix<double, 3, 2> coupling = tractions.transpose() * contraction;
-    coupling.row(1) += share * stretch;
+    coupling.row(1) += stretch;
     Eigen::Matrix2d stiffness;  // of the tractions' own strains
     stiffness << C(0, 0), C(0, 2), C(2, 0), C(2, 2);
     Unevenness found;
     found.coupling = turn.transpose() * coupling;
-    found.bending = share * bending + contraction.transpose() * stiffness * contraction;
+    found.bending = bending + contraction.transpose() * stiffness * contraction;
     if (more.norm() > 1e-12 * C.norm()) found.stretch = turn.transpose() * more * turn;
     return found;
 }

@@ -32,6 +32,18 @@ struct Unevenness {
     bool isZero() const { return stretch.isZero(0.0) && coupling.isZero(0.0) && bending.isZero(0.0); }
 };
 
+/// An upright rectangle, and which wood lies where in it: the same for all maps whose materials differ in numbers alone, so that
+/// it is looked for once.
+struct WoodArea {
+    Vec2 centre, half;  // [m]
+    struct Sample {
+        int wood = -1;       // number of the material, or of the first of two; -1: void
+        double grade = 0.0;  // of the way from it to the next
+        Vec2 radial = Vec2::UnitX();
+    };
+    std::vector<Sample> samples = {};  // on a square lattice, row by row; none: not asked for yet
+};
+
 /// The scene's wood by place: one material, analytic rings, or a picture. Cutouts are not its business.
 /// Between EW and LW the density goes linearly and the other constants follow it (`transition_wood`). Orthotropic wood stands as
 /// layers across its radial direction.
@@ -53,13 +65,14 @@ class MaterialMap {
 
     /// Averaged over an upright rectangle: elasticity as layers across the direction in which the wood changes most, the rest by
     /// area.
+    LocalWood average(WoodArea& area) const;
     LocalWood average(const Vec2& centre, const Vec2& half) const;
 
     /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Layers share the strain along
     /// them, wherever they lie, and the tractions between them are those of the mean strain: the part that q stretches along the
     /// layers feels the moments of E', r and p (`LayeredElasticity`), the rest the average. Places count with their distance from
     /// the middle times `spread`, so that the points which integrate the average have the same second moment.
-    Unevenness unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
+    Unevenness unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const;
 
     bool homogeneous() const { return homogeneous_; }
     bool orthotropic() const { return orthotropic_; }  // some of it
@@ -72,9 +85,12 @@ class MaterialMap {
 
   private:
     struct Known;
-    LocalWood at_place(const Vec2& x) const;
-    LocalWood find_average(const Vec2& centre, const Vec2& half) const;
-    Unevenness find_unevenness(const Vec2& centre, const Vec2& half, const LocalWood& average, const Vec2& spread) const;
+    class Transition;
+    WoodArea::Sample sample_at(const Vec2& x) const;
+    LocalWood wood_of(const WoodArea::Sample& sample) const;
+    int sample(WoodArea& area) const;
+    LocalWood find_average(WoodArea& area) const;
+    Unevenness find_unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const;
     LocalWood mix(int first, int second, double grade) const;
     void check_radial_direction() const;
     void check_transition(int first) const;
@@ -85,13 +101,15 @@ class MaterialMap {
     void average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                             LayeredElasticity& mean) const;
     const LocalWood* band_around(const Vec2& centre, const Vec2& half) const;
-    LocalWood in_rings(const Vec2& x) const;
+    WoodArea::Sample in_rings(const Vec2& x) const;
     std::size_t pixel_at(const Vec2& x) const;
-    LocalWood in_picture(const Vec2& x) const;
+    WoodArea::Sample in_picture(const Vec2& x) const;
 
     const Scene& scene_;
-    std::vector<Material> materials_;     // in the order of labels
-    std::vector<LocalWood> pure_;         // the same, ready made
+    std::vector<Material> materials_;  // in the order of labels
+    std::vector<LocalWood> pure_;      // the same, ready made
+    std::vector<std::shared_ptr<const Transition>>
+        transition_;                      // [materials - 1] from each to the next; none: wood is not graded
     Vec2 picture_offset_ = Vec2::Zero();  // [m]
     double picture_cos_ = 1.0;
     double picture_sin_ = 0.0;

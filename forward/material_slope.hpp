@@ -14,11 +14,11 @@ namespace crampfit {
 /// 1e-5 of the number. Their error is of the order of 1e-10.
 class MaterialSlope {
   public:
-    /// Throws InputError where the scene has no such number. `body` must outlive this.
-    MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body);
+    /// Of these numbers. Throws InputError where the scene has none of that name. `body` must outlive them.
+    static std::vector<MaterialSlope> of(const Scene& scene, const std::vector<std::string>& keys, const Discretisation& body);
 
-    /// The same number for a part of the specimen that has its lower left corner there. `part` must outlive this.
-    MaterialSlope(const MaterialSlope& whole, const Discretisation& part, const Vec2& corner);
+    /// Of the same numbers for a part of the specimen that has its lower left corner there. `part` must outlive them.
+    static std::vector<MaterialSlope> of(const std::vector<MaterialSlope>& whole, const Discretisation& part, const Vec2& corner);
 
     /// Stiffness of a cell's points [Pa / the number's unit].
     const Eigen::Matrix3d& stiffness(int cell) const { return stiffness_[cell]; }
@@ -34,13 +34,19 @@ class MaterialSlope {
     double opening_modulus(const Vec2& centre, const Vec2& half, const Vec2& along) const;
 
   private:
-    void find_stiffness();
+    MaterialSlope(const Scene& scene, const std::string& key, const Discretisation& body);
+    MaterialSlope(const MaterialSlope& whole, const Discretisation& part, const Vec2& corner);
+    static void look_at_cells(std::vector<MaterialSlope>& numbers, const Discretisation& body);
+    Unevenness between(const Unevenness& less, const Unevenness& more) const;
+
     double step_;
     std::shared_ptr<const Scene> more_scene_, less_scene_;
     MaterialMap more_, less_;
     std::vector<Eigen::Matrix3d> stiffness_;  // [cells]
     const Discretisation* body_;
-    mutable std::map<std::pair<int, PointBox>, Unevenness> unevenness_;  // as they were asked for
+    std::vector<int> uneven_of_cell_;                                 // [cells] the place of its unevenness, or -1
+    std::vector<Unevenness> uneven_;                                  // of whole cells
+    mutable std::map<std::pair<int, PointBox>, Unevenness> in_part_;  // of their pieces, as they were asked for
 };
 
 }  // namespace crampfit

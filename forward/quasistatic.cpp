@@ -65,7 +65,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
                          const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body),
       equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_) {
-    for (const std::string& key : numbers) numbers_.emplace_back(scene, key, body_);
+    numbers_ = MaterialSlope::of(scene, numbers, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;

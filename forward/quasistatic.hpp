@@ -158,8 +158,8 @@ class Quasistatic {
     bool know_slopes(std::size_t number, int time);
     bool goes_with_load(const std::vector<Vec2>& drivers) const;
     std::optional<Slopes> slopes_here(const Missed& missed);
-    void add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
-                    bool as_end, std::vector<LoadState>& slopes) const;
+    void add_slopes(const Missed& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
+                    std::vector<LoadState>& slopes) const;
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     std::vector<std::optional<TipBoxes>> boxes_ahead() const;

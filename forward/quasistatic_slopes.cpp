@@ -112,8 +112,7 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
         of_number.end_power = of_number.power;
     }
     const std::vector<LoadState> of_grid = found;
-    if (!missed.here.by_number.empty()) add_slopes(missed.here, slope, of_grid, false, found);
-    if (!missed.as_end.by_number.empty()) add_slopes(missed.as_end, slope, of_grid, true, found);
+    add_slopes(missed, slope, of_grid, found);
     std::vector<std::vector<Vec2>> moved;
     Slopes all;
     if (!scene_.output.probes.places.empty()) {
@@ -135,23 +134,32 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
 }
 
 // Adds the derivatives of what the grid misses to its own.
-void Quasistatic::add_slopes(const MissedEnergy& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
-                             bool as_end, std::vector<LoadState>& slopes) const {
-    const int gauge = Gauges(scene_).force;
-    const Vec2 direction = Gauges(scene_).force_direction;
-    std::vector<Vec2> load = missed.by_displacement;
-    for (Vec2& f : load) f *= -1.0;
-    const Equilibrium::Motion yielding = equilibrium_.yield_to(load);
-    const double potential = equilibrium_.potential(), ratio = 1.0 + missed.energy / potential;
-    for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
-        const double more = missed.by_number[n] + slope.along(yielding, n);
-        (as_end ? slopes[n].end_potential : slopes[n].potential) += more;
-        if (equilibrium_.boundary().has_dead_load()) continue;
-        const double ratio_slope = (more - missed.energy * of_grid[n].potential / potential) / potential;
-        (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium_.power();
-        if (!as_end)
-            slopes[n].reactions[gauge] =
-                ratio * of_grid[n].reactions[gauge] + ratio_slope * equilibrium_.reactions()[gauge].dot(direction) * direction;
+void Quasistatic::add_slopes(const Missed& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
+                             std::vector<LoadState>& slopes) const {
+    const Gauges gauges(scene_);
+    const Vec2 direction = gauges.force_direction;
+    const double potential = equilibrium_.potential();
+    std::vector<const MissedEnergy*> some;
+    for (const MissedEnergy* of : {&missed.here, &missed.as_end})
+        if (!of->by_number.empty()) some.push_back(of);
+    Eigen::MatrixXd loads(slope.fields.rows(), some.size());
+    for (std::size_t k = 0; k < some.size(); ++k)
+        loads.col(k) = -Eigen::Map<const Eigen::VectorXd>(some[k]->by_displacement.data()->data(), loads.rows());
+    const Eigen::MatrixXd change = slope.fields.transpose() * equilibrium_.yields_to(loads);  // [numbers x some]
+    for (std::size_t k = 0; k < some.size(); ++k) {
+        const bool as_end = some[k] == &missed.as_end;
+        const double ratio = 1.0 + some[k]->energy / potential;
+        for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
+            const double more = some[k]->by_number[n] + change(n, k);
+            (as_end ? slopes[n].end_potential : slopes[n].potential) += more;
+            if (equilibrium_.boundary().has_dead_load()) continue;
+            const double ratio_slope = (more - some[k]->energy * of_grid[n].potential / potential) / potential;
+            (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium_.power();
+            if (!as_end)
+                slopes[n].reactions[gauges.force] =
+                    ratio * of_grid[n].reactions[gauges.force] +
+                    ratio_slope * equilibrium_.reactions()[gauges.force].dot(direction) * direction;
+        }
     }
 }
 

@@ -114,7 +114,32 @@ UnevenCells::Local UnevenCells::local(const Piece& piece, const Unevenness& wood
     return at;
 }
 
+UnevenCells::State UnevenCells::small_state(const Piece& piece, const Unevenness& wood,
+                                            const std::vector<Vec2>& displacement) const {
+    const Layout& layout = body_.layout;
+    const Vec2 cell = layout.cell;
+    const PointBox& box = piece.box;
+    const double side = layout.per_side, share = (box.to_x - box.from_x) * (box.to_y - box.from_y) / (side * side);
+    const double x = 0.5 * (box.from_x + box.to_x) / side, y = 0.5 * (box.from_y + box.to_y) / side;
+    const auto node = body_.points.node[piece.point];
+    const Vec2 &u0 = displacement[node[0]], &u1 = displacement[node[1]], &u2 = displacement[node[2]], &u3 = displacement[node[3]];
+    const Vec2 across = u0 - u1 - u2 + u3;
+    const Vec2 by_x = (u1 - u0 + y * across) / cell.x(), by_y = (u2 - u0 + x * across) / cell.y();
+    const Eigen::Vector3d strain(by_x.x(), by_y.y(), by_x.y() + by_y.x());
+    const double area = cell.prod();
+    Eigen::Vector3d s = wood.coupling * across;
+    if (!wood.stretch.isZero(0.0)) s += area * (wood.stretch * strain);
+    const Vec2 t = wood.coupling.transpose() * strain + wood.bending * across / area;
+    const double volume = share * layout.thickness;
+    const Vec2 along_x = volume / cell.x() * Vec2(s[0], s[2]), along_y = volume / cell.y() * Vec2(s[2], s[1]);
+    const Vec2 pull = volume * t + y * along_x + x * along_y;
+    State state{0.5 * volume * (s.dot(strain) + t.dot(across)), {}};
+    state.force << pull - along_x - along_y, along_x - pull, along_y - pull, pull;
+    return state;
+}
+
 UnevenCells::State UnevenCells::state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const {
+    if (!rotates_) return small_state(piece, wood, displacement);
     const Local at = local(piece, wood, displacement);
     const Mat2 P = at.turn * (Mat2() << at.p[0], at.p[1], at.p[2], at.p[3]).finished();
     const Vec2 pull = at.turn * at.t;

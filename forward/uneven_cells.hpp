@@ -43,6 +43,7 @@ class UnevenCells {
 
   private:
     struct Local;
+    State small_state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;  // small strain
     Local local(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
     const Unevenness& wood_of(const Discretisation::UnevenCell& cell, const PointBox& box);
 

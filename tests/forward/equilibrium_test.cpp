@@ -142,7 +142,7 @@ TEST(UnitInternalForce, IsTheSlopeOfItsEnergy) {
             const InternalForce internal(body, materials, rotates);
             ASSERT_EQ(internal.uneven().pieces().empty(), !rings);
             std::vector<Vec2> force(cracks.fields(), Vec2::Zero());
-            internal.add(displacement, force);
+            internal.add_with_energy(displacement, force);
             double largest = 0, worst = 0;
             for (const Vec2& f : force) largest = std::max(largest, f.norm());
             for (int f = 0; f < cracks.fields(); ++f) {

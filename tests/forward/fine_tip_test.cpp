@@ -114,8 +114,7 @@ TEST(UnitFineTip, NothingIsMissedInOneWood) {
 
 TEST(UnitFineTip, BoxesThatTakeACrackAlongAreAsMadeAnew) {
     AtRest run(two_woods(2.025e-3, 1.8e-3, 0.1e-3));
-    std::vector<MaterialSlope> numbers;
-    numbers.emplace_back(run.scene, "materials.EW.E", run.body);
+    const std::vector<MaterialSlope> numbers = MaterialSlope::of(run.scene, {"materials.EW.E"}, run.body);
     FineTip kept(run.scene, run.plan, run.materials, run.body, numbers);
     const auto boxes = kept.about(run.equilibrium.cracks(), 0, {1.8e-3, 2e-3}, {2.0e-3, 2e-3});
     ASSERT_TRUE(boxes);
@@ -154,8 +153,7 @@ TEST(GradientFineTip, SlopesByModuliAgainstCentralDifferences) {
     for (const double tip : {1.93e-3, 2.08e-3}) {
         const Scene scene = two_woods(2.025e-3, tip, 0.1e-3);
         AtRest run(scene);
-        std::vector<MaterialSlope> numbers;
-        for (const std::string& key : keys) numbers.emplace_back(scene, key, run.body);
+        const std::vector<MaterialSlope> numbers = MaterialSlope::of(scene, keys, run.body);
         const MissedEnergy missed = missed_by(run, numbers);
         std::vector<Vec2> load = missed.by_displacement;
         for (Vec2& f : load) f *= -1.0;

@@ -326,7 +326,7 @@ TEST(GradientHistory, TangentAndTurningOfCells) {
             const int nodes = body.layout.nodes();
             const auto forces = [&](const std::vector<Vec2>& u) {
                 std::vector<Vec2> force(nodes, Vec2::Zero());
-                internal.add(u, force);
+                internal.add_with_energy(u, force);
                 return force;
             };
             std::vector<Vec2> u(nodes);

@@ -102,8 +102,7 @@ TEST(GradientLocalYield, OfEnergyAndForce) {
     ASSERT_EQ(motions.size(), 1u);
     std::vector<std::string> keys{"materials.EW.E", "materials.LW.E", "materials.EW.nu", "materials.LW.nu",
                                   "specimen.density_exponents.E"};
-    std::vector<MaterialSlope> numbers;
-    for (const std::string& key : keys) numbers.emplace_back(scene, key, trial.body);
+    const std::vector<MaterialSlope> numbers = MaterialSlope::of(scene, keys, trial.body);
     const Equilibrium::Slopes slopes = trial.equilibrium.slopes(numbers);
     for (int n = 0; n < static_cast<int>(keys.size()); ++n) {
         StaticTrial more(at(keys[n], step)), less(at(keys[n], -step));

@@ -220,8 +220,9 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
     const Scene scene = two_woods(8, [&](const Vec2& x) { return x.x() > 0.75 * h; });
     const MaterialMap materials(scene);
     const Vec2 middle(0.5 * h, 0.5 * h);
-    const LocalWood average = materials.average(middle, middle);
-    const Unevenness wood = materials.unevenness(middle, middle, average, {spread, spread});
+    WoodArea cell{middle, middle};
+    const LocalWood average = materials.average(cell);
+    const Unevenness wood = materials.unevenness(cell, average, {spread, spread});
     const double in_quarter = h * h * (9.0 / 64 + (1 - 1 / 16.0) / 192), in_all = h * h / 12 * (1 - 1 / 256.0);  // means of x^2
     Eigen::Matrix<double, 3, 2> coupling = Eigen::Matrix<double, 3, 2>::Zero();
     coupling(1, 1) = (E2 - E1) / 4 * spread * 3 * h / 8;
@@ -231,7 +232,8 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
     EXPECT_LT((wood.bending - bending).norm(), 1e-9 * bending.norm());
     EXPECT_TRUE(wood.stretch.isZero(0.0));
     // Of the cell's left half: what earlywood is short of the average.
-    const Unevenness left = materials.unevenness({0.25 * h, 0.5 * h}, {0.25 * h, 0.5 * h}, average, {0.0, 0.0});
+    WoodArea left_half{{0.25 * h, 0.5 * h}, {0.25 * h, 0.5 * h}};
+    const Unevenness left = materials.unevenness(left_half, average, {0.0, 0.0});
     const Eigen::Matrix3d early =
         plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
     EXPECT_LT((left.stretch - early).norm(), 1e-12 * early.norm());
