@@ -67,18 +67,21 @@ std::string field_figure(const Comparison& comparison) {
 
 /// An arrival is drawn the way that people draw it: crack length over the displacement of its arrival.
 std::string comparison_figure(const Comparison& comparison) {
-    const bool arrival = comparison.kind == "arrival";
+    const bool arrival = comparison.kind == "arrival", length = comparison.kind == "crack_length";
     const ScaledUnit millimetre{1e-3, "mm"};
     const std::vector<double> measured = column(comparison, &FitResidual::measured),
                               modelled = column(comparison, &FitResidual::modelled);
-    const ScaledUnit unit = arrival ? millimetre : unit_for(measured, units::force);
+    const ScaledUnit unit = arrival || length ? millimetre : unit_for(measured, units::force);
     const std::vector<double> at = scaled(column(comparison, &FitResidual::at), millimetre);
     const std::vector<double> sigma = comparison.rows.size() <= most_bars_of_error
                                           ? scaled(column(comparison, &FitResidual::sigma), unit)
                                           : std::vector<double>{};
-    Chart chart{.title = fmt::format("{}: {}", comparison.experiment, arrival ? "arrival of the crack" : comparison.kind),
+    Chart chart{.title = fmt::format("{}: {}", comparison.experiment,
+                                     arrival  ? "arrival of the crack"
+                                     : length ? "crack length"
+                                              : comparison.kind),
                 .x_label = "Displacement [mm]",
-                .y_label = arrival ? "Crack length [mm]" : fmt::format("Force [{}]", unit.symbol)};
+                .y_label = arrival || length ? "Crack length [mm]" : fmt::format("Force [{}]", unit.symbol)};
     ChartSeries data{.label = sigma.empty() ? "measured" : "measured, ± sigma", .colour = colour::black, .kind = Kind::points};
     ChartSeries model{.label = "fitted", .colour = colour::vermillion};
     data.x = arrival ? scaled(measured, unit) : at;
@@ -95,7 +98,8 @@ std::string residuals_figure(const Comparison& comparison) {
     const bool field = is_field(comparison);
     const std::vector<double> at = scaled(column(comparison, field ? &FitResidual::modelled : &FitResidual::at), {1e-3, "mm"});
     return draw(
-        {.title = fmt::format("{}: residuals of {}", comparison.experiment, comparison.kind),
+        {.title = fmt::format("{}: residuals of {}", comparison.experiment,
+                              comparison.kind == "crack_length" ? "crack length" : comparison.kind),
          .x_label = arrival ? "Crack length [mm]"
                     : field ? "Displacement of the point, fitted [mm]"
                             : "Displacement [mm]",

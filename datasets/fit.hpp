@@ -41,8 +41,8 @@ struct FitRun {
 /// One data point of one experiment against the model at the best parameters.
 struct FitResidual {
     std::string experiment;
-    std::string kind;     // "force", "arrival", or a component of a displacement field, "u_x" or "u_y"
-    double at = 0;        // displacement [m] or time [s] for force and fields; crack length [m] for arrival
+    std::string kind;     // "force", "arrival", "crack_length", or a component of a displacement field, "u_x" or "u_y"
+    double at = 0;        // displacement [m] or time [s]; crack length [m] for arrival
     double measured = 0;  // SI
     double modelled = 0;  // SI
     double sigma = 0;     // SI

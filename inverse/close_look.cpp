@@ -23,6 +23,8 @@ constexpr int most_rounds = 10;
 constexpr int points_a_parameter = 12;  // of a spread
 constexpr int most_profiles = 4;        // in windows of rising width
 constexpr double rounding = 1e-9;       // of the box
+constexpr double as_good = 0.02;        // of the misfit, in what the noise explains: a seventh of a standard error
+constexpr int most_descents = 4;        // from lower points that looks come upon
 
 bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
 
@@ -218,6 +220,35 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
         profiled = look(wider(profiled->window, x));
     }
     return found;
+}
+
+bool is_lower(const Run& one, const Run& other, const Uncertainty& about) {
+    return one.evaluation->misfit < other.evaluation->misfit - as_good * about.widening;
+}
+
+std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,
+                                          const std::function<void()>& descend) {
+    std::optional<CloseLook> close = look();
+    for (int i = 0; i < most_descents && close && is_lower(close->uncertainty.best, *objective.best(), close->uncertainty); ++i) {
+        const Run before = *objective.best();
+        objective.at(close->uncertainty.best.x);
+        if (!is_lower(*objective.best(), before, close->uncertainty)) {
+            break;
+        }
+        descend();
+        close = look();
+    }
+    if (close) {
+        Uncertainty& u = close->uncertainty;
+        const Eigen::VectorXd way = objective.best()->x - u.best.x;
+        u.covariance += way * way.transpose();
+        if (u.model_variance.size() > 0) {
+            u.model_variance += way.cwiseAbs2();
+        }
+        u.lower_95 = u.lower_95.cwiseMin((u.lower_95 + way).cwiseMax(0.0));
+        u.upper_95 = u.upper_95.cwiseMax((u.upper_95 + way).cwiseMin(1.0));
+    }
+    return close;
 }
 
 }  // namespace crampfit

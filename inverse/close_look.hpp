@@ -4,6 +4,7 @@
 #include "inverse/uncertainty.hpp"
 #include "inverse/window.hpp"
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,5 +39,14 @@ struct CloseLook {
 /// `curve_lengths` and `names` as in `estimate_uncertainty`.
 std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
                                     const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed);
+
+/// Whether a run is lower than another by more than what is as good as the same, with what is said `about` the place.
+bool is_lower(const Run& one, const Run& other, const Uncertainty& about);
+
+/// `look`s about the best run. Where runs nearby promise a lower point and a run there confirms it, the objective `descend`s from
+/// there and has another look, some times at most. What they promise and no run confirms counts as an error: covariance and
+/// intervals, which are those about the promised point, take in the way to the best run.
+std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,
+                                          const std::function<void()>& descend);
 
 }  // namespace crampfit

@@ -207,10 +207,16 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             if (!by_walks) {
                 return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
             }
-            const Eigen::VectorXd x = objective.best()->x;
-            runs.walks().catch_up(runs.values_at(x));
-            wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
-            close = look_close(objective, runs.nearby().near(x), x, model.curve_lengths(), names, options.seed);
+            const auto look = [&] {
+                if (wide.valid()) {  // of what was the best point before: the same runs for any number of threads
+                    wide.wait();
+                }
+                const Eigen::VectorXd x = objective.best()->x;
+                runs.walks().catch_up(runs.values_at(x));
+                wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
+                return look_close(objective, runs.nearby().near(x), x, model.curve_lengths(), names, options.seed);
+            };
+            close = look_and_descend(objective, look, [&] { found.converged = runs.descend_again(); });
             return close ? close->uncertainty
                          : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
         };
@@ -225,8 +231,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         Uncertainty uncertainty = estimate();
         Exploration exploration = look_around(uncertainty);
         // It may have come upon a better point. About that one, then, where it is not as good as the same.
-        const double gain = uncertainty.best.evaluation->misfit - objective.best()->evaluation->misfit;
-        if (!close && gain > 0.02 * uncertainty.widening) {
+        if (!close && is_lower(*objective.best(), uncertainty.best, uncertainty)) {
             objective.set_budget_left(reserve);
             uncertainty = estimate();
             exploration = look_around(uncertainty);

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
+#include <numeric>
 
 namespace crampfit {
 namespace {
@@ -126,6 +128,31 @@ class GrowthByRows {
     double steady_step_ = 0;
 };
 
+// What an error of the abscissa, one sigma, does to a mean of the curve at a place: its range within two sigmas over their width,
+// times sigma: for a straight line slope times sigma, and near a jump it knows of the jump.
+double shift_error(const std::function<double(double)>& mean_at, double at, double sigma, double first, double last) {
+    double low = INFINITY, high = -INFINITY;
+    for (const double shift : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
+        const double value = mean_at(std::clamp(at + shift * sigma, first, last));
+        low = std::min(low, value);
+        high = std::max(high, value);
+    }
+    const double span = std::min(at + 2 * sigma, last) - std::max(at - 2 * sigma, first);
+    return span > 0 ? (high - low) / span * sigma : 0.0;
+}
+
+// A jump between two rows, `jump` of what the curve goes from one to the next, was anywhere between them. What that does to the
+// mean: the jump times the standard deviation of its place, uniform between the rows, over the window.
+double sampling_error(const Curve& rows, double from, double to, const std::function<double(double, double)>& jump) {
+    double variance = 0;
+    for (std::size_t i = 0; i + 1 < rows.x().size(); ++i) {
+        if (rows.x()[i] < to && rows.x()[i + 1] > from) {
+            variance += std::pow(jump(rows.y()[i], rows.y()[i + 1]) * (rows.x()[i + 1] - rows.x()[i]) / (to - from), 2) / 12;
+        }
+    }
+    return std::sqrt(variance);
+}
+
 }  // namespace
 
 Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
@@ -162,7 +189,7 @@ void Comparison::add_curves(const Experiment& experiment) {
         add_force_stations(experiment);
     }
     if (measured(data.crack_length)) {
-        add_arrival_stations(experiment);
+        add_crack_stations(experiment);
     }
 }
 
@@ -189,34 +216,6 @@ double Comparison::force_at(const Curve& force, double at) const {
     return force.mean(at - half, at + half);
 }
 
-// What an error of the abscissa, one sigma, does to the force: its range within two sigmas over their width, times sigma:
-// for a straight line slope times sigma, and near a jump it knows of the jump.
-double Comparison::shift_error(const Curve& force, double at, double sigma) const {
-    double low = INFINITY, high = -INFINITY;
-    for (const double shift : {-2.0, -1.0, 0.0, 1.0, 2.0}) {
-        const double value = force_at(force, std::clamp(at + shift * sigma, from_, to_));
-        low = std::min(low, value);
-        high = std::max(high, value);
-    }
-    const double span = std::min(at + 2 * sigma, to_) - std::max(at - 2 * sigma, from_);
-    return span > 0 ? (high - low) / span * sigma : 0.0;
-}
-
-// A fall of the force between two rows, as a jump of the crack makes it, was anywhere between them. What that does to the mean:
-// the fall times the standard deviation of its place, uniform between the rows, over the window. `usual` is what the force goes
-// from row to row.
-double Comparison::sampling_error(const Curve& rows, double at, double usual) const {
-    const double from = std::max(from_, at - 0.5 * window_), to = std::min(to_, at + 0.5 * window_);
-    double variance = 0;
-    for (std::size_t i = 0; i + 1 < rows.x().size(); ++i) {
-        const double fall = std::abs(rows.y()[i]) - std::abs(rows.y()[i + 1]);
-        if (fall > clear * usual && rows.x()[i] < to && rows.x()[i + 1] > from) {
-            variance += std::pow(fall * (rows.x()[i + 1] - rows.x()[i]) / (to - from), 2) / 12;
-        }
-    }
-    return std::sqrt(variance);
-}
-
 void Comparison::add_force_stations(const Experiment& experiment) {
     const Curve rows(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
@@ -230,6 +229,10 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         peak = std::max(peak, std::abs(force));
     }
     const double usual = std::max(noise, usual_step(rows));
+    const auto fall = [usual](double before, double after) {
+        const double by = std::abs(before) - std::abs(after);
+        return by > clear * usual ? by : 0.0;
+    };
     const int stations = sparse ? static_cast<int>(rows.x().size()) : tiles;
     for (int i = 0; i < stations; ++i) {
         const double at = sparse ? rows.x()[static_cast<std::size_t>(i)] : from_ + (i + 0.5) * window_;
@@ -240,18 +243,27 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
         station.measured = force_at(rows, at);
         const double of_noise = noise / std::sqrt(averaged);
-        const double of_data_place = shift_error(rows, at, abscissa_noise_) / std::sqrt(averaged);
-        const double of_model_place = shift_error(rows, at, model_resolution_ * at);
-        const double of_sampling = sampling_error(rows, at, usual);
+        const auto place_error = [&](double sigma) {
+            return shift_error([&](double x) { return force_at(rows, x); }, at, sigma, from_, to_);
+        };
+        const double of_data_place = place_error(abscissa_noise_) / std::sqrt(averaged);
+        const double of_model_place = place_error(model_resolution_ * at);
+        const double of_sampling =
+            sampling_error(rows, std::max(from_, at - 0.5 * window_), std::min(to_, at + 0.5 * window_), fall);
         const double of_model_force = model_resolution_ * peak;
         station.sigma = Eigen::Vector<double, 5>(of_noise, of_sampling, of_data_place, of_model_place, of_model_force).norm();
         stations_.push_back(station);
     }
 }
 
-void Comparison::add_arrival_stations(const Experiment& experiment) {
+void Comparison::add_crack_stations(const Experiment& experiment) {
     const Curve rows(abscissa_, experiment.data.crack_length);
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
+    add_arrival_stations(experiment, rows, noise);
+    add_length_stations(experiment, rows, noise);
+}
+
+void Comparison::add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise) {
     const double from = rows.x().front();
     const double to = rows.x().back();
     // Few rows are taken as they are: a window would draw a jump's ends into the rows beside it, which the model's many rows do
@@ -306,6 +318,63 @@ void Comparison::add_arrival_stations(const Experiment& experiment) {
     }
 }
 
+// Where no arrival has been taken from.
+void Comparison::add_length_stations(const Experiment& experiment, const Curve& rows, double noise) {
+    std::vector<double> arrivals;
+    for (const FitResidual& station : stations_) {
+        if (station.kind == "arrival") {
+            arrivals.push_back(station.measured);
+        }
+    }
+    if (arrivals.empty()) {
+        return;
+    }
+    std::sort(arrivals.begin(), arrivals.end());
+    const std::vector<double>& x = rows.x();
+    const double first = x.front(), last = x.back();
+    if (arrival_window_ > 0) {
+        double from = first;
+        const auto tile_up_to = [&](double to) {
+            const auto tiles = static_cast<int>(std::lround((to - from) / arrival_window_));
+            for (int i = 0; i < tiles; ++i) {
+                length_tiles_.emplace_back(std::lerp(from, to, static_cast<double>(i) / tiles),
+                                           std::lerp(from, to, static_cast<double>(i + 1) / tiles));
+            }
+        };
+        for (const double arrival : arrivals) {
+            tile_up_to(arrival - 0.5 * arrival_window_);
+            from = arrival + 0.5 * arrival_window_;
+        }
+        tile_up_to(last);
+    } else {
+        for (std::size_t i = 0; i < x.size(); ++i) {  // an arrival is taken from the rows on both sides of it
+            const double before = x[i > 0 ? i - 1 : 0], after = x[std::min(i + 1, x.size() - 1)];
+            if (std::none_of(arrivals.begin(), arrivals.end(), [&](double a) { return a >= before && a <= after; })) {
+                length_tiles_.emplace_back(x[i], x[i]);
+            }
+        }
+    }
+    const double longest = *std::max_element(rows.y().begin(), rows.y().end());
+    const auto jump = [&](double before, double after) { return after - before > clear * noise ? after - before : 0.0; };
+    const auto is_empty = [&](const auto& tile) { return tile.first < tile.second && rows.count(tile.first, tile.second) == 0; };
+    std::erase_if(length_tiles_, is_empty);  // gaps in the data
+    for (const auto& [from, to] : length_tiles_) {
+        const double at = std::midpoint(from, to), half = 0.5 * (to - from);
+        const double averaged = std::max(1, rows.count(from, to));
+        const auto place_error = [&](double sigma) {
+            return shift_error([&](double u) { return rows.mean(u - half, u + half); }, at, sigma, first, last);
+        };
+        FitResidual station{.experiment = experiment.name, .kind = "crack_length", .at = at, .measured = rows.mean(from, to)};
+        const double of_sampling = half > 0 ? sampling_error(rows, from, to, jump) : 0.0;
+        station.sigma =
+            Eigen::Vector<double, 5>(noise / std::sqrt(averaged), of_sampling, place_error(abscissa_noise_) / std::sqrt(averaged),
+                                     place_error(model_resolution_ * at), model_resolution_ * longest)
+                .norm();
+        stations_.push_back(station);
+        counts_.push_back(1.0);
+    }
+}
+
 Eigen::VectorXd Comparison::modelled(const Record& record, double slack_force) const {
     const bool only_fields = fields_ && fields_->stations().size() == stations_.size();
     std::vector<double> values = only_fields ? std::vector<double>{} : on_curves(record, slack_force);
@@ -336,14 +405,18 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
         abscissa.push_back(arrival_end_);
         lengths.push_back(lengths.back());
     }
-    const Curve crack = Curve(abscissa, lengths).smoothed(arrival_window_);
+    const Curve length(abscissa, lengths), crack = length.smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());
     std::vector<double> values;
+    auto tile = length_tiles_.begin();
     for (const FitResidual& station : stations_) {
         if (station.kind == "force") {
             values.push_back(force_at(force, station.at));
         } else if (station.kind == "arrival") {
             values.push_back(crack.arrival(station.at).value_or(end + pace_ * (station.at - longest)));
+        } else if (station.kind == "crack_length") {
+            values.push_back(length.mean(tile->first, tile->second));
+            ++tile;
         }
     }
     return values;

@@ -9,6 +9,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace crampfit {
@@ -32,6 +33,10 @@ class Curve;
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
 ///
+/// Crack length: at displacements (times), as force is, over what windows of arrivals leave: tiles about a window wide between
+/// them, or single rows, so that every row counts once, also where the crack stands or grows by less than noise, which says
+/// little of when.
+///
 /// Force is compared where data exist. After the end of a Record the force is that of a slack machine if the specimen
 /// split, else the last one.
 class Comparison {
@@ -40,7 +45,8 @@ class Comparison {
     static constexpr int most_arrivals = 200;
 
     /// `model_resolution`: how well the model knows what it says, as a part of the displacement (time) to which it places an
-    /// event and of the peak force that its vibration moves. Both count as errors beside the noise of the data.
+    /// event, of the peak force that its vibration moves and of the longest crack. These count as errors beside the noise of the
+    /// data.
     /// Throws InputError, naming the data file, for data with nothing in it to compare.
     explicit Comparison(const Experiment& experiment, double model_resolution = 0.0);
 
@@ -61,11 +67,11 @@ class Comparison {
     void add_curves(const Experiment& experiment);
     std::vector<double> on_curves(const Record& record, double slack_force) const;
     void add_force_stations(const Experiment& experiment);
-    void add_arrival_stations(const Experiment& experiment);
+    void add_crack_stations(const Experiment& experiment);
+    void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
+    void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
     double force_at(const Curve& force, double at) const;
-    double shift_error(const Curve& force, double at, double sigma) const;
-    double sampling_error(const Curve& rows, double at, double usual) const;
 
     double model_resolution_;
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
@@ -77,6 +83,7 @@ class Comparison {
     double arrival_window_ = 0;  // of the average of crack length [m] or [s]
     double arrival_end_ = 0;     // of the measured crack lengths
     double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
+    std::vector<std::pair<double, double>> length_tiles_;  // from, to [m] or [s]: one a station of crack length
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
     std::vector<double> counts_;         // [stations]

@@ -167,7 +167,7 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
 std::vector<int> StudyModel::curve_lengths() const {
     std::vector<int> lengths;
     for (const Comparison& comparison : comparisons_) {
-        for (const char* kind : {"force", "arrival", "u_x", "u_y"}) {
+        for (const char* kind : {"force", "arrival", "crack_length", "u_x", "u_y"}) {
             const auto count = std::count_if(comparison.stations().begin(), comparison.stations().end(),
                                              [kind](const FitResidual& station) { return station.kind == kind; });
             if (count > 0) {

@@ -120,11 +120,17 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     const std::vector<int> lengths = model_.curve_lengths();
     const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
     SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
-    for (int round = 0; found.converged && round < most_weighings; ++round) {
-        // How well the model knows what it says shows where it fits.
+    found.converged = weigh_and_descend(found.converged, enough > 0);
+    return found;
+}
+
+bool StudyRuns::descend_again() { return weigh_and_descend(crampfit::descend_again(objective_, nearby_, options_.seed), false); }
+
+// How well the model knows what it says shows where it fits: on to the lowest point as that weighs it.
+bool StudyRuns::weigh_and_descend(bool converged, bool ended_early) {
+    for (int round = 0; converged && round < most_weighings; ++round) {
         const double likely = model_.likely_resolution(*objective_.best()->evaluation, solver_resolution);
-        const bool ended_early = round == 0 && enough > 0;
-        if (!ended_early && model_.change_of_sigma(likely) <= 0.1) {
+        if (!(round == 0 && ended_early) && model_.change_of_sigma(likely) <= 0.1) {
             break;
         }
         model_.set_resolution(likely);
@@ -133,9 +139,9 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
             model_.weigh(evaluation, model_.box().values(run.x));
             return evaluation;
         });
-        found.converged = descend_again(objective_, nearby_, options_.seed);
+        converged = crampfit::descend_again(objective_, nearby_, options_.seed);
     }
-    return found;
+    return converged;
 }
 
 }  // namespace crampfit

@@ -30,6 +30,9 @@ class StudyRuns {
     /// (descend_by_walks), weighed by what the residuals say of the model's resolution.
     SearchResult descend(int starts, const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
 
+    /// The same from the best run on. Whether that ended by its own criterion.
+    bool descend_again();
+
     /// The parameters' values at a point of the unit cube [parameters], SI.
     std::vector<double> values_at(const Eigen::VectorXd& x) const;
 
@@ -44,6 +47,7 @@ class StudyRuns {
     Forward forward() const;
     Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
+    bool weigh_and_descend(bool converged, bool ended_early);
     Evaluation run(const Eigen::VectorXd& x, int share);
     Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;
 

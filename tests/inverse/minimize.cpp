@@ -344,5 +344,67 @@ TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
     }
 }
 
+// Two valleys beside one another, each of noise and (x - x0) / s, the floor of one higher by 20; the lower of both counts.
+Evaluation two_valleys(const VectorXd& x) {
+    Evaluation evaluation;
+    evaluation.residuals = VectorXd::Ones(30);  // noise, by turns above and below
+    for (Eigen::Index i = 0; i < 30; i += 2) {
+        evaluation.residuals[i] = -1;
+    }
+    const Vector2d high = (x - Vector2d(0.38, 0.5)) / 0.02, low = (x - Vector2d(0.5, 0.5)) / 0.02;
+    const bool is_high = high.squaredNorm() + 20 < low.squaredNorm();
+    evaluation.residuals.head(2) = is_high ? high : low;
+    evaluation.residuals[2] = is_high ? std::sqrt(21.0) : 1.0;
+    evaluation.misfit = evaluation.residuals.squaredNorm();
+    return evaluation;
+}
+
+TEST(UnitCloseLook, GoesDownToALowerValleyThatItComesUpon) {
+    Objective objective(
+        2, [](const VectorXd& x, int) { return two_valleys(x); }, 100, 1);
+    objective.at(Vector2d(0.38, 0.5));
+    int descents = 0;
+    const auto look = [&] {
+        return look_close(
+            objective, [](const VectorXd& x, int) { return two_valleys(x); }, objective.best()->x, {30}, {"a", "b"}, 1);
+    };
+    const auto found = look_and_descend(objective, look, [&] {
+        ++descents;
+        objective.at(Vector2d(0.5, 0.5));
+    });
+    ASSERT_TRUE(found);
+    EXPECT_EQ(descents, 1);
+    EXPECT_EQ(objective.best()->x, Vector2d(0.5, 0.5));
+    EXPECT_NEAR(found->uncertainty.lower_95[1], 0.5 - found->uncertainty.quantile * 0.02, 0.002);
+    EXPECT_NEAR(found->uncertainty.upper_95[0], 0.5 + found->uncertainty.quantile * 0.02, 0.002);
+}
+
+// The cheap model has its lowest point elsewhere, which no run confirms: the intervals hold both.
+TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
+    const auto bowl = [](const Vector2d& bottom) {
+        return [bottom](const VectorXd& x, int) {
+            Evaluation evaluation = two_valleys(x);
+            evaluation.residuals.head(3) << (x - bottom) / 0.02, 1.0;
+            evaluation.misfit = evaluation.residuals.squaredNorm();
+            return evaluation;
+        };
+    };
+    const Vector2d best(0.5, 0.5), promised(0.53, 0.5);
+    Objective objective(2, bowl(best), 100, 1);
+    objective.at(best);
+    const auto found = look_and_descend(
+        objective,
+        [&] {
+            return look_close(objective, bowl(promised), best, {30}, {"a", "b"}, 1);
+        },
+        [] { FAIL() << "nothing is confirmed"; });
+    ASSERT_TRUE(found);
+    const Uncertainty& u = found->uncertainty;
+    EXPECT_NEAR((u.best.x - promised).norm(), 0.0, 0.005);
+    EXPECT_NEAR(u.covariance(0, 0), 0.02 * 0.02 + 0.03 * 0.03, 0.3e-3);
+    EXPECT_NEAR(u.lower_95[0], best[0] - u.quantile * 0.02, 0.005);
+    EXPECT_NEAR(u.upper_95[0], promised[0] + u.quantile * 0.02, 0.005);
+}
+
 }  // namespace
 }  // namespace crampfit

@@ -134,6 +134,81 @@ TEST(UnitResiduals, StationsInOneJumpCountTogetherAsOne) {
     EXPECT_GE(1 / std::sqrt(weight), 0.8 * 1e-3 / 399);
 }
 
+// A crack that grows slower than its noise, then jumps: lengths at displacements that arrivals leave, each row counted once.
+Record slow_then_jumping(double jump_at, double slope = 0.4) {
+    Record record;
+    for (int i = 0; i < 400; ++i) {
+        Instant instant;
+        instant.displacement = 1e-3 * i / 399;
+        instant.crack_length = 2e-3 + slope * instant.displacement + (instant.displacement > jump_at ? 3e-3 : 0.0);
+        record.series.push_back(instant);
+    }
+    return record;
+}
+
+Experiment slow_experiment(const Record& truth, unsigned seed) {
+    Experiment experiment;
+    experiment.name = "test";
+    experiment.data = measure(truth, 0, 0.1e-3, seed);
+    experiment.data.force.clear();
+    experiment.noise.crack_length = 0.1e-3;
+    return experiment;
+}
+
+TEST(UnitResiduals, LengthsAtDisplacementsUseWhatArrivalsLeave) {
+    constexpr int draws = 200;
+    const Record truth = slow_then_jumping(0.8e-3);
+    double squares = 0, neighbours = 0, count = 0, rows = 0, information = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+        const Comparison comparison(slow_experiment(truth, static_cast<unsigned>(draw + 1)));
+        const Eigen::VectorXd modelled = comparison.modelled(truth);
+        const Eigen::VectorXd longer = comparison.modelled(slow_then_jumping(0.8e-3, 0.44));
+        double before = 0;
+        for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+            const FitResidual& station = comparison.stations()[i];
+            const double residual = (modelled[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma;
+            if (station.kind == "crack_length") {
+                squares += residual * residual;
+                neighbours += residual * before;
+                count += 1;
+                rows += std::pow(0.1e-3 / station.sigma, 2);
+                const double change = (longer - modelled)[static_cast<Eigen::Index>(i)] / 0.04;
+                information += std::pow(change / station.sigma, 2);
+                before = residual;
+            }
+        }
+    }
+    std::printf("%.1f stations a draw, worth %.0f rows of 400, mean square %.2f, autocorrelation %.3f\n", count / draws,
+                rows / draws, squares / count, neighbours / squares);
+    EXPECT_NEAR(squares / count, 1, 0.06);  // three standard errors of some 9000 squares
+    EXPECT_NEAR(neighbours / squares, 0, 0.04);
+    EXPECT_GT(rows / draws, 0.75 * 400);  // some arrivals have windows of 8 rows
+    EXPECT_LT(rows / draws, 400);
+    // Of the slope, by all rows: the sum of u^2 over them, in noise.
+    EXPECT_GT(information / draws, 0.75 * 400 * 1e-6 / 3 / std::pow(0.1e-3, 2));
+}
+
+TEST(UnitResiduals, LengthsAtDisplacementsLeaveAJumpToItsArrival) {
+    const Comparison comparison(slow_experiment(slow_then_jumping(0.8e-3), 1));
+    for (const FitResidual& station : of_kind(comparison, "crack_length")) {
+        EXPECT_GT(std::abs(station.at - 0.8e-3), 0.01e-3);  // half a window
+        EXPECT_LT(station.sigma, 0.04e-3);                  // of seven rows or eight, and no jump in it
+    }
+}
+
+TEST(UnitResiduals, FewRowsOfALengthAreStationsUnlessArrivalsLieBetweenThem) {
+    Record truth = slow_then_jumping(0.8e-3, 0.0);
+    std::erase_if(truth.series, [](const Instant& instant) { return std::lround(instant.displacement * 399e3) % 20 != 0; });
+    Experiment experiment = slow_experiment(truth, 1);
+    experiment.data = measure(truth, 0, 0, 1);
+    experiment.data.force.clear();
+    const auto lengths = of_kind(Comparison(experiment), "crack_length");
+    ASSERT_EQ(lengths.size(), truth.series.size() - 2);  // the crack jumps between two of them
+    for (const FitResidual& station : lengths) {
+        EXPECT_DOUBLE_EQ(station.sigma, 0.1e-3);
+    }
+}
+
 TEST(UnitResiduals, DisplacementNoiseEntersByTheSlope) {
     Experiment experiment = straight_experiment();
     experiment.noise.displacement = 3e-5;
@@ -202,8 +277,8 @@ TEST(UnitResiduals, ModelForceAfterASplitIsZeroAndElseTheLast) {
 // The modelled arrival must go on smoothly when a record ends just before a station instead of just behind it.
 TEST(UnitResiduals, AStationThatIsNeverReachedIsFiniteAndContinuous) {
     const Comparison comparison(straight_experiment());
-    const auto last = static_cast<Eigen::Index>(comparison.stations().size()) - 1;
-    const double needed = comparison.stations().back().measured;
+    const auto last = static_cast<Eigen::Index>(50 + of_kind(comparison, "arrival").size()) - 1;  // behind 50 of force
+    const double needed = of_kind(comparison, "arrival").back().measured;
     double before = 1e9;
     for (double end = 0.3e-3; end < 1e-3; end += 0.01e-3) {
         const double arrival = comparison.modelled(straight(1e5, 8, end))[last];
