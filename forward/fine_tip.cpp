@@ -11,9 +11,7 @@ namespace {
 
 // Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of. What the held outlines take from
 // the wood beyond leaves 1 % in the load that carries a crack across a boundary 30 : 1, half of that with 8 in place of 6; as
-// much is left by cells of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`). Where bodies, edges
-// that are held or other cracks leave no room for that, the outer box is narrower: three quarters of it are off by up to 4 % in
-// the energy that is released, half by 8, and the grid alone by 47.
+// much is left by cells of a quarter, where an eighth would leave a fourth of it (`VerificationFineTip`).
 constexpr std::array<double, 2> half_widths{6.0, 4.0};
 
 // Boxes begin and end at each second of these cells, so that those of neighbouring places are the same more often.
@@ -110,6 +108,30 @@ bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, cons
     return true;
 }
 
+// Whether a body, where it has come to, presses on the wood in a box. Beside the outline, which is held, it may: within a cell.
+bool is_pressed(const Scene& scene, const Discretisation& body, const Box& box, const Equilibrium& equilibrium, bool may_follow) {
+    const Boundary& boundary = equilibrium.boundary();
+    const double beside = 0.5 * body.layout.point_size().maxCoeff();  // from a point to its face
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        const int driver = boundary.first_body() + static_cast<int>(b);
+        Vec2 gone = boundary.travel(driver, equilibrium.time());
+        if (may_follow) gone += equilibrium.contacts().moved[driver];
+        const Shape& shape = scene.bodies[b].shape;
+        const Box about{bounds(shape).low.array() - beside, bounds(shape).high.array() + beside};
+        bool pressed = false;
+        body.for_cells_in({box.low + 1.5 * body.layout.cell, box.high - 1.5 * body.layout.cell}, [&](int c) {
+            for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1] && !pressed; ++p) {
+                Vec2 x = body.points.position[p] - gone;
+                for (int k = 0; k < body.layout.nodes_per_cell(); ++k)
+                    x += body.weights[body.points.slot[p]].value[k] * equilibrium.displacements()[body.points.node[p][k]];
+                pressed = about.contains(x) && (inside(shape, x) || nearest_on_outline(shape, x).distance < beside);
+            }
+        });
+        if (pressed) return true;
+    }
+    return false;
+}
+
 // The mean turn of the wood in a box.
 Mat2 turn_of(const Discretisation& body, const Box& box, const std::vector<Vec2>& displacement) {
     Mat2 mean = Mat2::Zero();
@@ -141,13 +163,12 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
     found.share = share_that_counts(body_, from, to);
     if (found.share == 0.0) return std::nullopt;
     const Box way{from.cwiseMin(to), from.cwiseMax(to)};
-    for (const double outer : {half_widths[0], 0.75 * half_widths[0], 0.5 * half_widths[0]}) {
-        found.boxes[0] = box_around(way, outer, body_.layout.cell, {Vec2::Zero(), size});
-        if (!stands_alone(scene_, cracks, crack, found.boxes[0], size)) continue;
-        found.boxes[1] = box_around(way, half_widths[1], 0.5 * body_.layout.cell, found.boxes[0]);
-        return found;
-    }
-    return std::nullopt;
+    Box within{Vec2::Zero(), size};
+    Vec2 cell = body_.layout.cell;
+    for (std::size_t k = 0; k < half_widths.size(); ++k, cell *= 0.5)
+        within = found.boxes[k] = box_around(way, half_widths[k], cell, within);
+    if (!stands_alone(scene_, cracks, crack, found.boxes[0], size)) return std::nullopt;
+    return found;
 }
 
 // The one that has been solved with this crack, or one from whose crack it goes on.
@@ -177,7 +198,7 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    if (opening <= 0.0) return {};
+    if (opening <= 0.0 || is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies)) return {};
 
     // Small strain: of what is left when the turn of the box as a whole is taken off.
     Mat2 turn = Mat2::Identity();
