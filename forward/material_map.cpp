@@ -53,7 +53,7 @@ Rectangle rectangle(const Vec2& centre, const Vec2& half, const Vec2& spread) {
 
 }  // namespace
 
-// Wood by its grade between two materials, from a table of what `mix` makes: a cubic through four entries is within 1e-10 of it,
+// Wood by its grade between two materials, from a table of what `mix` makes: a cubic through four entries is within 2e-10 of it,
 // the moduli 1000 apart, and takes a tenth of the time.
 class MaterialMap::Transition {
   public:

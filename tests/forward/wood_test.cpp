@@ -1,9 +1,11 @@
 // Shape functions, wood by place, and the grid's layout.
+#include "forward/transition_wood.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 
 namespace crampfit::test {
@@ -211,6 +213,28 @@ TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
     std::printf("normal of an edge in a picture, cells of 8 pixels: within %.2f degrees, %.2f on average\n", worst, sum / count);
     EXPECT_LT(worst, least_told);
     EXPECT_LT(sum / count, 1.0);  // as asked of orientations
+}
+
+// The map's transition wood comes from a table: against the laws themselves, moduli 1000 apart.
+TEST(UnitWood, TransitionWoodFollowsItsLaws) {
+    Scene scene = block({2e-3, 2e-3}, 1e-3);
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{Vec2(-1e-3, 1e-3), 4e-3, 0.25, 1.5e-3};  // transition wood from 0.5 to 2 mm
+    scene.materials["EW"] = {40e6, 0.33, 300.0, 100.0};
+    scene.materials["LW"] = {40e9, 0.3, 750.0, 250.0};
+    const MaterialMap materials(scene);
+    double worst = 0.0;
+    for (int k = 1; k < 1000; ++k) {
+        const double grade = k / 1000.0;
+        const LocalWood found = materials.at(Vec2(0.5e-3 + grade * 1.5e-3, 1e-3));
+        const Material law = transition_wood(scene.materials.at("EW"), scene.materials.at("LW"), {}, grade);
+        const double modulus =
+            layered(plane_elasticity(law.youngs_modulus, law.poisson_ratio, scene.model.plane)).coefficients[0];
+        worst = std::max({worst, std::abs(found.plane_modulus() / modulus - 1), std::abs(found.toughness / law.toughness - 1),
+                          std::abs(found.density / law.density - 1)});
+    }
+    std::printf("transition wood, moduli 1000 apart: within %.1e of its laws\n", worst);
+    EXPECT_LT(worst, 1e-9);  // of a place in the ring, rounding leaves 1e-12
 }
 
 TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
