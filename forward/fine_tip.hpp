@@ -2,7 +2,6 @@
 
 #include "forward/cut_out.hpp"
 
-#include <array>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -19,7 +18,7 @@ struct MissedEnergy {
 
 /// Boxes about the way of a tip over an advance, one within the other.
 struct TipBoxes {
-    std::array<Box, 2> boxes;
+    std::vector<Box> boxes;
     double share = 0;  // of what is missed there that counts
 
     /// Whether a tip lies as deep in them as it needs to.
@@ -30,8 +29,8 @@ struct TipBoxes {
 /// `tip_lag` and the ties see to that. Where the tip passes into wood many times as stiff, G falls to nothing and rises again
 /// within a cell, and the grid gives up to twice the energy that the next cells release. So the wood around the tip is cut out
 /// with its outline held where the grid has it, and solved with cells as they are and half as wide; within that a smaller box is,
-/// with cells a quarter as wide. The differences add up to what is missed, to first order in them (the fast adaptive composite
-/// idea of McCormick 1984, one way down).
+/// with cells a quarter as wide, and where an end of the way is close to the boundary one more. The differences add up to what is
+/// missed, to first order in them (the fast adaptive composite idea of McCormick 1984, one way down).
 ///
 /// The finer cells see the same wood otherwise averaged, whatever the tip does. That is as much in the same boxes before an
 /// advance and after it, and takes no part in what the advance releases; in boxes that follow the tip it would.
@@ -50,7 +49,7 @@ class FineTip {
     MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
 
   private:
-    CutOut& cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end);
+    CutOut& cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use);
 
     const Scene& scene_;
     const MaterialMap& materials_;
