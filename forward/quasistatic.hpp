@@ -20,7 +20,7 @@ namespace crampfit {
 /// that the crack took when it was first followed, so that other toughnesses find most of what they need here.
 ///
 /// Where a single tip's next advance releases least, as in front of a boundary that it crosses, the load must be highest: there
-/// stations of a linear scene stand closer, whatever the toughness.
+/// stations stand closer, whatever the toughness; in scenes that are not linear only about sharp boundaries.
 ///
 /// Of several tips the one moves whose next advance, the others standing, pays for itself at the least load; tips that nothing
 /// tells apart, as in a symmetric specimen, move together. Which one that is depends on the toughness, and with it the way.

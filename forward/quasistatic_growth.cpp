@@ -176,7 +176,8 @@ bool Quasistatic::extend(double now) {
     const int on = next(last, {tips}, now);
     if (on < 0) return false;
     coming_ = {on};
-    if (closer_ == 1 || places_[on].station.left || !let_move(on, tips, now)) return true;
+    if (closer_ == 1 || places_[on].station.left || (!plan_.linear && !places_[on].boxes[0]) || !let_move(on, tips, now))
+        return true;
     const int after = next(on, {tips}, now);
     if (after < 0 || places_[after].station.left || !let_move(after, tips, now) || places_[places_[after].further].station.left)
         return true;
@@ -185,25 +186,42 @@ bool Quasistatic::extend(double now) {
     return true;
 }
 
-// The energy that a place's next advance releases; negative where it is not known [J].
+// The energy that a place's next advance releases; negative where it is not known [J]. Where scenes are not linear, from the
+// nearest time that both its ends are known at, as its power says.
 double Quasistatic::released(int number, int time) {
     const int further = places_[number].further;
-    if (!know_exactly(number, time) || !know_exactly(further, time)) return -1.0;
-    return places_[number].states.at(time).potential - places_[further].states.at(time).end_potential;
+    const std::map<int, LoadState>& from = places_[number].states;
+    const std::map<int, LoadState>& to = places_[further].states;
+    int nearest = 0;
+    for (const auto& [t, state] : from)
+        if (to.count(t) && std::abs(t - time) < std::abs(nearest - time)) nearest = t;
+    if (plan_.linear || nearest == 0) {
+        if (!know_exactly(number, time) || !know_exactly(further, time)) return -1.0;
+        nearest = time;
+    }
+    const double energy = from.at(nearest).potential - to.at(nearest).end_potential;
+    if (nearest == time || energy <= 0.0) return energy;
+    const double power = from.at(nearest).power - to.at(nearest).end_power;
+    return energy * std::pow(time_of(time) / time_of(nearest), power * time_of(nearest) / energy);
 }
 
 // Two stretches of the way from place to place, the first place left out, with closer places where the middle one is one of
 // narrowly least energy released; else none. First half way to either side, then about the least of these.
 std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, double now) {
-    const int time = time_until(now);
+    int time = time_until(now);
     std::map<int, std::pair<int, double>> found;  // by quarters of an increment from the first: place, and energy released
     const auto add = [&](int quarters, int place) { found[quarters] = {place, place < 0 ? -1.0 : released(place, time)}; };
     const auto narrow_at = [&](int middle, int apart) {
         return is_narrow(found[middle - apart].second, found[middle].second, found[middle + apart].second);
     };
     for (int k = 0; k < 3; ++k) add(4 * k, about[k]);
-    int least = 4;
-    for (int apart = 4; 4 / apart < closer_ && narrow_at(least, apart); apart /= 2) {
+    if (!plan_.linear && narrow_at(4, 4)) {  // states as the middle one moves on will be asked for again
+        const Critical due = critical_of_front(about[1], materials_, now, never, false);
+        if (std::isfinite(due.time)) time = time_until(due.time);
+        for (int k = 0; k < 3; ++k) add(4 * k, about[k]);
+    }
+    int least = 4, apart = 4;
+    for (; 4 / apart < closer_ && narrow_at(least, apart); apart /= 2) {
         for (const int side : {-apart / 2, apart / 2}) {
             const int quarters = least + side;
             add(quarters, place_between(about[quarters / 4], quarters % 4, now));
@@ -215,7 +233,8 @@ std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, dou
     std::vector<int> places;
     if (found.size() == about.size()) return places;
     for (const auto& [quarters, place] : found)
-        if (quarters > 0) places.push_back(place.first);
+        if (quarters > 0 && (plan_.linear || quarters % 4 == 0 || std::abs(quarters - least) <= apart))
+            places.push_back(place.first);
     return places;
 }
 
