@@ -13,15 +13,16 @@ namespace {
 // Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of: of the outermost the first for
 // which there is room among bodies, edges that are held and other cracks, and of those within it. The first, and two within it,
 // are for ways of which an end lies within `close_by` cells of a boundary between woods as unlike as `strong_contrast`. Over 0.2
-// mm that end at a boundary 30 : 1, wherever that lies in a cell, the energy released is off by 0.7 % with cells of 0.1 mm
-// and 1.6 % with 0.2 mm (root of the mean square), and by 2.3 and 8 % with the boxes for elsewhere: outlines that are held take
-// from the wood beyond, and where the tip passes the boundary within a cell, that gives up the energy of both woods evenly.
+// mm that end at a boundary 30 : 1, wherever that lies in a cell, the energy released is off by 1.2 % with cells of 0.1 mm and
+// 1.7 % with 0.2 mm (root of the mean square, `VerificationFineTip`), and by 1.9 and 7.8 % with the boxes for elsewhere: outlines
+// that are held take from the wood beyond, and where the tip passes the boundary within a cell, that gives up the energy of both
+// woods evenly.
 constexpr std::array<double, 4> outermost_half_widths{8.0, 6.0, 4.5, 3.0};
 constexpr std::array<double, 2> half_widths_close_by{6.0, 4.0};
 constexpr std::array<double, 1> half_widths_elsewhere{4.0};
 constexpr double close_by = 0.5;
 
-// Boxes begin and end at each so manieth of these cells, so that those of neighbouring places are the same more often.
+// Boxes begin and end at multiples of so many of these cells, so that those of neighbouring places are the same more often.
 constexpr std::array<double, 3> pitches{2.0, 2.0, 4.0};
 
 // As many cut-outs are kept as two sets of boxes take, for the ends of an advance, and as many again for another tip.
