@@ -1,5 +1,6 @@
 #include "forward/cut_out.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace crampfit {
@@ -59,7 +60,8 @@ int GridView::point_beside(const Vec2& x) const {
 
 CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell)
     : box(place), scene(scene_in(whole, place, cell)), materials(wood.part(place.low)), body(scene, materials) {
-    // The sides that are not the specimen's own are held, where there is wood at them.
+    // The sides that are not the specimen's own are held, and those of its own on which it is held or loaded, where there is wood
+    // at them.
     const Vec2 size = whole.specimen.size, hair = 1e-6 * size;
     const auto hold = [&](Side side, int axis, bool high) {
         const double end = high ? body.layout.size()[axis] : 0.0;
@@ -70,10 +72,13 @@ CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& p
             return;
         }
     };
-    if (box.low.x() > hair.x()) hold(Side::left, 0, false);
-    if (box.high.x() < size.x() - hair.x()) hold(Side::right, 0, true);
-    if (box.low.y() > hair.y()) hold(Side::bottom, 1, false);
-    if (box.high.y() < size.y() - hair.y()) hold(Side::top, 1, true);
+    const auto has_edge = [&](Side side) {
+        return std::any_of(whole.edges.begin(), whole.edges.end(), [&](const Edge& edge) { return edge.side == side; });
+    };
+    if (box.low.x() > hair.x() || has_edge(Side::left)) hold(Side::left, 0, false);
+    if (box.high.x() < size.x() - hair.x() || has_edge(Side::right)) hold(Side::right, 0, true);
+    if (box.low.y() > hair.y() || has_edge(Side::bottom)) hold(Side::bottom, 1, false);
+    if (box.high.y() < size.y() - hair.y() || has_edge(Side::top)) hold(Side::top, 1, true);
 }
 
 const std::vector<MaterialSlope>& CutOutWood::slopes_by(const std::vector<MaterialSlope>& numbers) {

@@ -11,12 +11,11 @@ namespace crampfit {
 namespace {
 
 // Half widths of the boxes beside the tip's way, in cells of the grid that each is cut out of: of the outermost the first for
-// which there is room among bodies, edges that are held and other cracks, and of those within it. The first, and two within it,
-// are for ways of which an end lies within `close_by` cells of a boundary between woods as unlike as `strong_contrast`. Over 0.2
-// mm that end at a boundary 30 : 1, wherever that lies in a cell, the energy released is off by 1.2 % with cells of 0.1 mm and
-// 1.7 % with 0.2 mm (root of the mean square, `VerificationFineTip`), and by 1.9 and 7.8 % with the boxes for elsewhere: outlines
-// that are held take from the wood beyond, and where the tip passes the boundary within a cell, that gives up the energy of both
-// woods evenly.
+// which there is room among bodies and other cracks, and of those within it. The first, and two within it, are for ways of which
+// an end lies within `close_by` cells of a boundary between woods as unlike as `strong_contrast`. Over 0.2 mm that end at a
+// boundary 30 : 1, wherever that lies in a cell, the energy released is off by 1.2 % with cells of 0.1 mm and 1.7 % with 0.2 mm
+// (root of the mean square, `VerificationFineTip`), and by 1.9 and 7.8 % with the boxes for elsewhere: outlines that are held
+// take from the wood beyond, and where the tip passes the boundary within a cell, that gives up the energy of both woods evenly.
 constexpr std::array<double, 4> outermost_half_widths{8.0, 6.0, 4.5, 3.0};
 constexpr std::array<double, 2> half_widths_close_by{6.0, 4.0};
 constexpr std::array<double, 1> half_widths_elsewhere{4.0};
@@ -104,13 +103,8 @@ Box box_around(const Box& way, double half_width, double pitch, const Vec2& cell
     return {on_line(way.low, -half_width).cwiseMax(within.low), on_line(way.high, half_width).cwiseMin(within.high)};
 }
 
-// Whether nothing but the wood around it acts on a box of the specimen, and no crack but this one runs through it.
-bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box, const Vec2& size) {
-    const Vec2 hair = 1e-6 * size;
-    const bool meets[] = {box.high.y() > size.y() - hair.y(), box.low.y() < hair.y(), box.low.x() < hair.x(),
-                          box.high.x() > size.x() - hair.x()};
-    for (const Edge& edge : scene.edges)
-        if (meets[static_cast<int>(edge.side)]) return false;
+// Whether no body acts on a box inside, and no crack but this one runs through it.
+bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box) {
     for (const Body& rigid : scene.bodies) {
         const auto* circle = std::get_if<Circle>(&rigid.shape);
         if (!box.touches(bounds(rigid.shape))) continue;
@@ -210,7 +204,7 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
     Vec2 cell = body_.layout.cell;
     for (std::size_t k = is_close ? 0 : 1; k < outermost_half_widths.size(); ++k) {
         const Box outermost = box_around(way, outermost_half_widths[k], pitches[0], cell, {Vec2::Zero(), size});
-        if (!stands_alone(scene_, cracks, crack, outermost, size)) continue;
+        if (!stands_alone(scene_, cracks, crack, outermost)) continue;
         TipBoxes found{{outermost}, std::min(1.0, (far - nearest.way) / (far - near))};
         for (const double half_width : inner)
             found.boxes.push_back(box_around(way, half_width, pitches[found.boxes.size()], cell *= 0.5, found.boxes.back()));

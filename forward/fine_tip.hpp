@@ -41,7 +41,7 @@ class FineTip {
             const std::vector<MaterialSlope>& numbers);
 
     /// Boxes for a tip on the way from one place to another. None where no sharp boundary lies within 4 cells of the way, nor
-    /// where the boxes meet anything that holds or loads the specimen, or another crack.
+    /// where there is no room for them among bodies and other cracks.
     std::optional<TipBoxes> about(const CrackFields& cracks, int crack, const Vec2& from, const Vec2& to) const;
 
     /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing. With its slopes by the numbers, or

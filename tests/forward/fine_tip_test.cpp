@@ -110,6 +110,21 @@ TEST(VerificationFineTip, EnergyReleasedBehindAVeryStiffWood) {
     }
 }
 
+// Boxes reach up to the grips, which hold their outlines there.
+TEST(VerificationFineTip, EnergyReleasedBetweenGrips) {
+    const auto released_on = [](double cell) {
+        Scene scene = two_woods(2.05e-3, 1.85e-3, cell);
+        scene.specimen.size.y() = 1.2e-3;
+        for (Vec2& x : scene.cracks[0].points) x.y() = 0.6e-3;
+        return released(scene, 0.2e-3);
+    };
+    const double exact = released_on(0.025e-3)[1];
+    const auto [by_grid, all] = released_on(0.1e-3);
+    std::printf("grips six cells away: off by %+.1f %%, without fine boxes %+.1f %%\n", 100 * (all / exact - 1),
+                100 * (by_grid / exact - 1));
+    EXPECT_NEAR(all, exact, 0.03 * exact);
+}
+
 TEST(VerificationFineTip, CrackJustOffAGridLineIsTheSame) {
     // In the boxes rows of points lie between the grid line and the crack, which the grid itself does not tell apart.
     const AtRest on(two_woods(2.025e-3, 2.05e-3, 0.1e-3));
