@@ -18,7 +18,8 @@ constexpr double increment_in_cells = 0.5;
 // An advance is taken in at least so many stations, and in as many as it has cells; with a single tip in a linear scene, where
 // stations are cheap, in more, and with a single tip in more still about a narrow peak of the load that the crack needs. With
 // two, latewood of three cells and 30 times as stiff puts fitted toughnesses off by 5 to 10 %, with four by 0.5
-// (`scripts/virtual_wedges --scene opened --finer --seed 103`), and the peak of the wedge sample is 2.8 % low, with eight 0.2 %.
+// (`scripts/virtual_wedges --scene opened --finer --seed 103`), and the peak of the wedge sample is 2.8 % low, with eight 0.2 %
+// high.
 constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4, least_stations_in_peak = 8;
 
 // Into how many steps the loading of a scene that is not linear is divided.

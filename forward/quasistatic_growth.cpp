@@ -216,7 +216,9 @@ std::vector<int> Quasistatic::closer_places(const std::array<int, 3>& about, dou
     };
     for (int k = 0; k < 3; ++k) add(4 * k, about[k]);
     if (!plan_.linear && narrow_at(4, 4)) {  // states as the middle one moves on will be asked for again
+        const std::string failure = failure_;
         const Critical due = critical_of_front(about[1], materials_, now, never, false);
+        failure_ = failure;  // the crack may never come there: what is missing ends the way when it does
         if (std::isfinite(due.time)) time = time_until(due.time);
         for (int k = 0; k < 3; ++k) add(4 * k, about[k]);
     }

@@ -158,8 +158,7 @@ TEST(UnitFineTip, BoxesKeepClearOfWheels) {
         const auto boxes = FineTip(scene, run.plan, run.materials, run.body, none).about(run.equilibrium.cracks(), 0, tip, tip);
         return boxes ? boxes->boxes[0].high.y() : 0.0;
     };
-    // A tip half a cell before a boundary calls for 8 cells up to 2.8 mm; less room makes the box narrower, and then there is
-    // none.
+    // A tip this near to a boundary calls for 8 cells, up to 2.8 mm; less room makes the box narrower, and then there is none.
     EXPECT_NEAR(top_beside({2e-3, 3.02e-3}), 2.8e-3, 1e-9);
     EXPECT_NEAR(top_beside({2e-3, 2.98e-3}), 2.6e-3, 1e-9);
     EXPECT_NEAR(top_beside({2.95e-3, 2.95e-3}), 2.8e-3, 1e-9);  // beside a corner
