@@ -44,12 +44,30 @@ Overrides overrides_of(const CommonOptions& common) {
     return overrides;
 }
 
-void check_output(const std::filesystem::path& output, const std::filesystem::path& input) {
+void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs) {
     if (output.empty()) throw InputError("command line", "-o", "", "must be the name of a file");
     std::error_code neither_exists;
-    if (std::filesystem::equivalent(output, input, neither_exists))
-        throw InputError("command line", "-o", output.string(), "must not be the file that is read");
+    for (const std::filesystem::path& input : inputs)
+        if (std::filesystem::equivalent(output, input, neither_exists))
+            throw InputError("command line", "-o", output.string(), "must not be a file that is read");
     require_writable(output);
+}
+
+std::vector<std::filesystem::path> files_of(const Scene& scene) {
+    std::vector<std::filesystem::path> files{scene.file, scene.specimen.file};
+    if (const auto& picture = scene.specimen.picture) files.insert(files.end(), {picture->file, picture->orientation});
+    return files;
+}
+
+std::vector<std::filesystem::path> files_of(const Study& study) {
+    std::vector<std::filesystem::path> files;
+    for (const Experiment& experiment : study.experiments) {
+        files.push_back(experiment.data_file);
+        if (experiment.fields) files.push_back(experiment.fields->file);
+    }
+    for (const Scene* scene : scenes_of(study))
+        for (const std::filesystem::path& file : files_of(*scene)) files.push_back(file);
+    return files;
 }
 
 void complain(const std::string& line) { std::fputs(("crampfit: " + line + '\n').c_str(), stderr); }

@@ -32,8 +32,12 @@ void add_common_options(CLI::App& command, CommonOptions& common);
 /// Splits each KEY=VALUE at its first '='. Throws InputError for one without a key or '='.
 Overrides overrides_of(const CommonOptions& common);
 
-/// Throws InputError unless a result can be saved there without harm to the input.
-void check_output(const std::filesystem::path& output, const std::filesystem::path& input);
+/// Throws InputError unless a result can be saved there without harm to what is read.
+void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
+
+/// The files that a scene, or a study and its scenes, are read from.
+std::vector<std::filesystem::path> files_of(const Scene& scene);
+std::vector<std::filesystem::path> files_of(const Study& study);
 
 /// A line on standard error, where there is one: a run does not end because nobody listens.
 void complain(const std::string& line);

@@ -93,7 +93,12 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
         slopes = misfit ? Eigen::MatrixXd(2.0 * values.transpose() * *found) : *found;
     }
     if (misfit) values = Eigen::VectorXd::Constant(1, evaluation.misfit);
-    if (!values.allFinite() || !slopes.allFinite()) return "the run has no such output";
+    for (std::size_t k = 0; k < request.active.size(); ++k) {
+        const auto row = static_cast<Eigen::Index>(k);
+        if ((request.active[k] & DakotaRequest::value && !std::isfinite(values[row])) ||
+            (request.active[k] & DakotaRequest::gradient && !slopes.row(row).allFinite()))
+            return fmt::format("the run has no output for function {}", k + 1);
+    }
     std::vector<std::vector<double>> gradients(request.active.size());
     for (std::size_t k = 0; k < gradients.size() && slopes.size() > 0; ++k)
         for (const std::size_t variable : request.derivative_variables) {
@@ -106,9 +111,10 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
 }
 
 ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& common) {
-    check_output(arguments.results, arguments.study);
+    check_output(arguments.results, {arguments.study, arguments.parameters});
     const DakotaRequest request = read_dakota_request(arguments.parameters);
     const Study study = open_study(arguments.study, common);
+    check_output(arguments.results, files_of(study));
     const std::string failure =
         evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
     if (failure.empty()) return ExitStatus::done;

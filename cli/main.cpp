@@ -7,6 +7,7 @@
 #include <spdlog/sinks/null_sink.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fcntl.h>
 #include <new>
@@ -19,6 +20,12 @@ namespace {
 /// From here on, what is logged goes to the file of --log.
 void start_log(const CommonOptions& common, const std::vector<std::string>& words) {
     if (common.log.empty()) return;
+    const auto is_log = [&](const std::string& word) {
+        std::error_code neither_exists;
+        return std::filesystem::equivalent(common.log, word, neither_exists);
+    };
+    if (std::ranges::count_if(words, is_log) > std::ranges::count(words, "--log"))
+        throw InputError("command line", "--log", common.log.string(), "must not be a file that is read or made");
     try {
         spdlog::set_default_logger(spdlog::basic_logger_mt("file", common.log.string()));
     } catch (const spdlog::spdlog_ex&) {

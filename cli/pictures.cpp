@@ -47,8 +47,9 @@ void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string
 void check_series(const PictureSeries& series, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
-    check_output(series.output, series.reference);
-    for (const std::filesystem::path& image : series.images) check_output(series.output, image);
+    std::vector<std::filesystem::path> read = series.images;
+    read.insert(read.end(), {series.reference, series.mask});
+    check_output(series.output, read);
     series.options.validate();
     if (!series.preview.empty()) require_picture_name(series.preview, "--preview");
 }

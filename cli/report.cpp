@@ -30,7 +30,7 @@ std::string page_of(const std::filesystem::path& file) {
 ExitStatus write_report(const Arguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override in a file of results");
-    check_output(arguments.output, arguments.file);
+    check_output(arguments.output, {arguments.file});
     write_whole_file(arguments.output, page_of(arguments.file));
     report(common, fmt::format("saved as {}", arguments.output.string()));
     return ExitStatus::done;

@@ -104,9 +104,10 @@ void keep_memory() {
 ExitStatus segment_and_save(const Arguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override in a picture");
-    check_output(arguments.output, arguments.image);
+    const std::vector<std::filesystem::path> read{arguments.image, arguments.borders, arguments.density, arguments.direction};
+    check_output(arguments.output, read);
     if (!arguments.preview.empty()) {
-        check_output(arguments.preview, arguments.image);
+        check_output(arguments.preview, read);
         check_preview_name(arguments.preview);
     }
     keep_memory();

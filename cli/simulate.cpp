@@ -45,8 +45,9 @@ Record run(const Scene& scene, const CommonOptions& common) {
 }
 
 ExitStatus simulate_and_save(const Arguments& arguments, const CommonOptions& common) {
-    check_output(arguments.output, arguments.scene);
+    check_output(arguments.output, {arguments.scene});
     Scene scene = read_scene(arguments.scene, overrides_of(common));
+    check_output(arguments.output, files_of(scene));
     load_specimen(scene);
     stop_on_signals();
     spdlog::info("the scene is read");

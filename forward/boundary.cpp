@@ -9,6 +9,12 @@ namespace crampfit {
 
 namespace {
 
+// The ends of a stretch that is shorter are not seen on their own.
+constexpr double least_cells_between_ends = 4.0;
+
+// What is hardly free is held as if it were so far, for the condition of the stiffness.
+constexpr double least_freed = 0.02;
+
 bool on_side(const Layout& layout, Side side, const Vec2& x) {
     const Vec2 near = 1e-6 * layout.cell;
     switch (side) {
@@ -24,9 +30,11 @@ bool on_side(const Layout& layout, Side side, const Vec2& x) {
     return false;
 }
 
+int along_side(Side side) { return side == Side::top || side == Side::bottom ? 0 : 1; }
+
 bool in_range(const Layout& layout, const Edge& edge, const Vec2& x) {
     if (!edge.range) return true;
-    const int axis = edge.side == Side::top || edge.side == Side::bottom ? 0 : 1;
+    const int axis = along_side(edge.side);
     const double rounding = 1e-6 * layout.cell[axis];
     return x[axis] >= edge.range->first - rounding && x[axis] <= edge.range->second + rounding;
 }
@@ -78,13 +86,48 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
     return mass;
 }
 
-Boundary::Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks)
+Boundary::Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const MaterialMap* materials)
     : scene_(scene), body_(body), edges_(static_cast<int>(scene.edges.size())) {
-    hold_nodes(cracks);
+    hold_nodes(cracks, materials);
     place_tractions();
 }
 
-void Boundary::hold_nodes(const CrackFields& cracks) {
+// As tips that would run on into what is held: where a stretch of a side ends in whole wood that no other edge holds along an
+// axis.
+std::vector<CrackTip> Boundary::ends_within(const Edge& edge, int axis, const CrackFields& cracks,
+                                            const std::vector<double>& mass) const {
+    const Layout& layout = body_.layout;
+    const int along = along_side(edge.side);
+    const double cell = layout.cell[along];
+    std::vector<CrackTip> ends;
+    if (!edge.range || edge.range->second - edge.range->first < least_cells_between_ends * cell) return ends;
+    for (const auto& [end, inward] : {std::pair{edge.range->first, 1.0}, {edge.range->second, -1.0}}) {
+        const auto beyond = [&](const Vec2& x) { return inward * (end - x[along]); };
+        bool goes_on = false;
+        for (int n = 0; n < layout.nodes(); ++n) {
+            const Vec2 x = layout.node_position(n);
+            goes_on |= mass[n] > 0.0 && on_side(layout, edge.side, x) && beyond(x) >= cell && beyond(x) < 2.5 * cell;
+        }
+        const auto takes_over = [&](const Edge& other) {
+            if (&other == &edge || other.side != edge.side || !other.velocity[axis] || other.traction) return false;
+            Vec2 just_beyond = Vec2::Zero();
+            just_beyond[along] = end - 0.5 * inward * cell;
+            return in_range(layout, other, just_beyond);
+        };
+        CrackTip tip;
+        tip.position[along] = end;
+        tip.position[1 - along] = edge.side == Side::right || edge.side == Side::top ? layout.size()[1 - along] : 0.0;
+        tip.direction = Vec2::Zero();
+        tip.direction[along] = inward;
+        const Box about{tip.position - 1.5 * layout.cell, tip.position + 1.5 * layout.cell};
+        const auto cuts = [&](const CrackLine& line) { return line.comes_to(about); };
+        if (goes_on && std::ranges::none_of(scene_.edges, takes_over) && std::ranges::none_of(cracks.lines, cuts))
+            ends.push_back(tip);
+    }
+    return ends;
+}
+
+void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* materials) {
     const Layout& layout = body_.layout;
     const std::vector<double> mass = field_masses(body_, cracks.fields());
     std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
@@ -97,12 +140,33 @@ void Boundary::hold_nodes(const CrackFields& cracks) {
         const Edge& edge = scene_.edges[e];
         if (edge.traction) continue;
         int found = 0;
+        std::array<std::vector<CrackTip>, 2> ends;
+        for (const int axis : {0, 1})
+            if (materials && edge.velocity[axis]) ends[axis] = ends_within(edge, axis, cracks, mass);
         for (int n = 0; n < layout.nodes(); ++n) {
             const Vec2 x = layout.node_position(n);
-            if (mass[n] == 0.0 || !on_side(layout, edge.side, x) || !in_range(layout, edge, x)) continue;
-            ++found;
-            for (int axis = 0; axis < 2; ++axis)
-                if (edge.velocity[axis]) hold(n, axis, e);
+            if (mass[n] == 0.0 || !on_side(layout, edge.side, x)) continue;
+            found += in_range(layout, edge, x);
+            for (const int axis : {0, 1}) {
+                if (!edge.velocity[axis]) continue;
+                const CrackTip* near = nullptr;
+                double freed = 0.0;
+                for (const CrackTip& end : ends[axis]) {
+                    const double here = share_freed(x, end, layout);
+                    if (here > 0.0 && here < 1.0) {
+                        near = &end;
+                        freed = std::max(here, least_freed);
+                    }
+                }
+                if (near) {
+                    const double modulus = opening_modulus(*materials, x, 0.5 * layout.cell, near->direction);
+                    // Half a pair gives half as much.
+                    tied.push_back(
+                        {n, axis, e, 2.0 * tie_stiffness(freed, modulus * layout.thickness), modulus, x, near->direction});
+                } else if (in_range(layout, edge, x)) {
+                    hold(n, axis, e);
+                }
+            }
         }
         if (found == 0)
             throw InputError(scene_.file.string(), "edges." + edge.name, "range",
@@ -141,15 +205,20 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
 
 void Boundary::hold_further_fields(const CrackFields& cracks) {
     const int nodes = body_.layout.nodes();
-    held.erase(std::remove_if(held.begin(), held.end(), [&](const Held& h) { return h.field >= nodes; }), held.end());
-    const std::size_t on_nodes = held.size();
-    for (int f = nodes; f < cracks.fields(); ++f)
-        for (std::size_t i = 0; i < on_nodes; ++i) {
-            const Held node = held[i];
-            if (node.field != cracks.node_of_field[f]) continue;
-            if (node.driver >= edges_ || lies_at(scene_.edges[node.driver], f, node.field))
-                held.push_back({f, node.axis, node.driver});
-        }
+    const auto go_on = [&](auto& holds) {
+        std::erase_if(holds, [&](const auto& h) { return h.field >= nodes; });
+        const std::size_t on_nodes = holds.size();
+        for (int f = nodes; f < cracks.fields(); ++f)
+            for (std::size_t i = 0; i < on_nodes; ++i) {
+                auto further = holds[i];
+                if (further.field != cracks.node_of_field[f]) continue;
+                if (further.driver < edges_ && !lies_at(scene_.edges[further.driver], f, further.field)) continue;
+                further.field = f;
+                holds.push_back(further);
+            }
+    };
+    go_on(held);
+    go_on(tied);
 }
 
 void Boundary::place_tractions() {
@@ -157,14 +226,25 @@ void Boundary::place_tractions() {
         const Edge& edge = scene_.edges[e];
         if (!edge.traction) continue;
         int found = 0;
-        for (const Facet& facet : body_.facets) {
-            if (!on_side(body_.layout, edge.side, facet.position) || !in_range(body_.layout, edge, facet.position)) continue;
+        for (Facet facet : body_.facets) {
+            if (!on_side(body_.layout, edge.side, facet.position)) continue;
+            if (edge.range) {  // of the facet what lies in it
+                const int axis = along_side(edge.side);
+                const double from = facet.position[axis] - 0.5 * facet.length, to = facet.position[axis] + 0.5 * facet.length;
+                const double low = std::max(from, edge.range->first), high = std::min(to, edge.range->second);
+                if (high - low <= 1e-6 * facet.length) continue;
+                if (high - low < (1.0 - 1e-6) * facet.length) {
+                    facet.position[axis] = 0.5 * (low + high);
+                    facet.length = high - low;
+                    facet.weight = body_.values_at(body_.points.cell[facet.point], facet.position);
+                }
+            }
             ++found;
             tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, e});
             if (body_.layout.degree == 1) continue;
             // B-splines are integrated along the side by the points' own places, as the stress that holds against it is.
             const Box domain = body_.domain(facet.point);
-            const int axis = edge.side == Side::top || edge.side == Side::bottom ? 0 : 1;
+            const int axis = along_side(edge.side);
             Vec2 place = facet.position;
             place[axis] = 0.5 * (domain.low[axis] + domain.high[axis]);
             tractions.back().facet.weight = body_.values_at(body_.points.cell[facet.point], place);

@@ -14,16 +14,28 @@ class Boundary {
         int axis;
         int driver;
     };
+    struct Tied {  // a component that a stretch of an edge which ends there holds by a spring
+        int field;
+        int axis;
+        int driver;
+        double stiffness;      // [N/m]
+        double plane_modulus;  // E' of the wood that it goes with [Pa]
+        Vec2 place;            // of that wood
+        Vec2 along;            // unit, the side
+    };
     struct Traction {  // a force on a piece of the outline
         Facet facet;
         Vec2 force;  // [N]
         int driver;
     };
 
-    /// Throws InputError where an edge or a bonded body meets nothing.
-    Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks);
+    /// Throws InputError where an edge or a bonded body meets nothing. A stretch of a side is held at its nodes, those at its
+    /// ends included; with `materials` where it ends, wherever that lies in a cell. What is free beyond the end of a side that is
+    /// held across is half a crack, and its displacements are as singular: the end is seen as a tip is, by a tie to the edge.
+    Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const MaterialMap* materials = nullptr);
 
     std::vector<Held> held;
+    std::vector<Tied> tied;
     std::vector<Traction> tractions;
 
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
@@ -46,7 +58,9 @@ class Boundary {
     std::vector<Vec2> load_to_move(int driver, const Vec2& direction, std::size_t fields) const;
 
   private:
-    void hold_nodes(const CrackFields& cracks);
+    void hold_nodes(const CrackFields& cracks, const MaterialMap* materials);
+    std::vector<CrackTip> ends_within(const Edge& edge, int axis, const CrackFields& cracks,
+                                      const std::vector<double>& mass) const;
     void place_tractions();
     bool lies_at(const Edge& edge, int field, int node) const;
 

@@ -66,10 +66,18 @@ double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) 
     return 0.5 - ahead / cell_along.lpNorm<1>();
 }
 
+double tie_stiffness(double freed, double stiffness) { return (1.0 - freed) / freed * stiffness / pair_compliance; }
+
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along) {
     const LocalWood wood = materials.average(centre, half);
     if (!materials.orthotropic() || wood.filled == 0.0) return wood.plane_modulus();
     return 1.0 / near_tip_field(wood.elasticity.stiffness(), along).release()(0, 0);
+}
+
+bool CrackLine::comes_to(const Box& box) const {
+    for (std::size_t k = 0; k + 1 < points.size(); ++k)
+        if (box.touches({points[k].cwiseMin(points[k + 1]), points[k].cwiseMax(points[k + 1])})) return true;
+    return false;
 }
 
 Vec2 CrackLine::behind(bool at_end, double distance) const {
@@ -298,7 +306,8 @@ int CrackFields::field(int node, unsigned mask, int crack) {
     if (mask == 0) return node;
     const auto known = field_of_.find({node, mask});
     if (known != field_of_.end()) return known->second;
-    const int from = field(node, mask & ~(1u << crack), crack);
+    const unsigned own = 1u << crack;
+    const int from = field(node, mask & own ? mask & ~own : mask & (mask - 1u), crack);  // a crack less cuts it off
     const int added = fields();
     node_of_field.push_back(node);
     field_of_[{node, mask}] = added;

@@ -32,6 +32,8 @@ struct CrackLine {
     Vec2 behind(bool at_end, double distance) const;
     /// Unit direction of the crack, seen toward a tip, at the place of the crack that is nearest to x.
     Vec2 direction_near(bool at_end, const Vec2& x) const;
+    /// Whether the bounds of one of its straight pieces touch a box.
+    bool comes_to(const Box& box) const;
 };
 
 /// Two fields of one node, on either side of a crack.
@@ -52,6 +54,10 @@ struct FieldPair {
 
 /// Share of its way past a node, over the width of a cell, that a tip has gone: below 0 before, above 1 after.
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout);
+
+/// What still holds the pair of fields at a node together when so much of it is freed [N/m]; `stiffness`: E' of the wood times
+/// the thickness [N/m].
+double tie_stiffness(double freed, double stiffness);
 
 /// E' of the wood of a small area as a crack that runs along a direction sees it, G = K_I^2 / E' [Pa].
 double opening_modulus(const MaterialMap& materials, const Vec2& centre, const Vec2& half, const Vec2& along);

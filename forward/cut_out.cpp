@@ -8,9 +8,8 @@ namespace crampfit {
 namespace {
 
 // What is cut out, its wood a part of the specimen's.
-Scene scene_in(const Scene& whole, const Box& box, double cell) {
+Scene scene_in(const Scene& whole, const Box& box) {
     Scene scene = whole;
-    scene.model.cell = cell;
     SpecimenPlan& specimen = scene.specimen;
     specimen.size = box.high - box.low;
     const auto move = [&](Shape& shape) {
@@ -58,8 +57,9 @@ int GridView::point_beside(const Vec2& x) const {
     return nearest;
 }
 
-CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell)
-    : box(place), scene(scene_in(whole, place, cell)), materials(wood.part(place.low)), body(scene, materials) {
+CutOutWood::CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, const Vec2& width)
+    : box(place), cell(width), scene(scene_in(whole, place)), materials(wood.part(place.low)),
+      body(scene, materials, Layout::of(scene, width)) {
     // The sides that are not the specimen's own are held, and those of its own on which it is held or loaded, where there is wood
     // at them.
     const Vec2 size = whole.specimen.size, hair = 1e-6 * size;

@@ -22,14 +22,13 @@ struct GridView {
 
 /// The wood of a box of the specimen in cells of its own, without a crack: found once for all cracks there.
 struct CutOutWood {
-    CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, double cell);
+    CutOutWood(const Scene& whole, const MaterialMap& wood, const Box& place, const Vec2& width);
 
-    bool is(const Box& place, double width) const {
-        return place.low == box.low && place.high == box.high && width == scene.model.cell;
-    }
+    bool is(const Box& place, const Vec2& width) const { return place.low == box.low && place.high == box.high && width == cell; }
     const std::vector<MaterialSlope>& slopes_by(const std::vector<MaterialSlope>& numbers);
 
     Box box;      // in the specimen
+    Vec2 cell;    // that were asked for [m]
     Scene scene;  // of what is cut out; its outline is held where the specimen goes on
     MaterialMap materials;
     Discretisation body;

@@ -2,6 +2,8 @@
 
 #include "datasets/error.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -77,14 +79,26 @@ Eigen::Vector3d stress_out_of_plane(const LocalWood& wood) {
 
 }  // namespace
 
+// With four points a cell that takes more memory than a machine has: a cell in the wrong unit.
+constexpr double most_cells = 1e9;
+
 Layout Layout::of(const Scene& scene) {
     if (!(scene.model.cell > 0.0))
         throw InputError(scene.file.string(), "model.error", std::to_string(scene.model.error),
                          "the cell is chosen for a single simulation only; runs that are compared share a grid: give model.cell");
+    return of(scene, Vec2::Constant(scene.model.cell));
+}
+
+Layout Layout::of(const Scene& scene, const Vec2& cell) {
     Layout layout;
-    const auto count = [&](double length) { return std::max(1, static_cast<int>(std::lround(length / scene.model.cell))); };
-    layout.cells_x = count(scene.specimen.size.x());
-    layout.cells_y = count(scene.specimen.size.y());
+    if (const double cells = scene.specimen.size.cwiseQuotient(cell).prod(); !(cells <= most_cells))
+        throw InputError(scene.file.string(), "model.cell", fmt::format("{:g} mm", 1e3 * cell.minCoeff()),
+                         fmt::format("makes {:.3g} cells of this specimen: must make {:g} at most", cells, most_cells));
+    const auto count = [&](int axis) {
+        return std::max(1, static_cast<int>(std::lround(scene.specimen.size[axis] / cell[axis])));
+    };
+    layout.cells_x = count(0);
+    layout.cells_y = count(1);
     layout.cell = {scene.specimen.size.x() / layout.cells_x, scene.specimen.size.y() / layout.cells_y};
     layout.degree = scene.solver.shape_function == ShapeFunction::bspline2 ? 2 : 1;
     layout.per_side = static_cast<int>(std::lround(std::sqrt(scene.model.points_per_cell)));
@@ -113,7 +127,7 @@ CellEnds ends_of_kind(int kind) { return {(kind & 1) != 0, (kind & 2) != 0}; }
 
 }  // namespace
 
-Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials) : layout(Layout::of(scene)) {
+Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials, const Layout& grid) : layout(grid) {
     const ShapeFunction kind = scene.solver.shape_function;
     find_weights(kind == ShapeFunction::automatic ? ShapeFunction::gimp : kind);
     place_points(scene, materials);

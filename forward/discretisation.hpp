@@ -25,6 +25,8 @@ struct Layout {
     Vec2 cell;             // grid spacing in x and y [m]
     double thickness = 0;  // [m]
 
+    /// With cells about as wide as these, or as the scene says [m]: a whole number of them fits the specimen.
+    static Layout of(const Scene& scene, const Vec2& cell);
     static Layout of(const Scene& scene);
 
     int cells() const { return cells_x * cells_y; }
@@ -137,7 +139,8 @@ struct Facet {
 class Discretisation {
   public:
     /// Throws InputError when no point is left.
-    Discretisation(const Scene& scene, const MaterialMap& materials);
+    Discretisation(const Scene& scene, const MaterialMap& materials) : Discretisation(scene, materials, Layout::of(scene)) {}
+    Discretisation(const Scene& scene, const MaterialMap& materials, const Layout& grid);
 
     Layout layout;
     Points points;

@@ -50,7 +50,7 @@ constexpr double least_strain = 1e-5;
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
-      boundary_(scene, body, cracks_), gauges_(scene),
+      boundary_(scene, body, cracks_, &materials), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
       internal_force_(body, materials, plan.rotates, history_.get()), factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -162,6 +162,12 @@ void Equilibrium::find_forces() {
         reaction_[driver] = sliding_[i].push(place_of(driver), displacement_, force_);
         contact_energy_ += sliding_[i].stored_energy() + sliding_[i].dissipated();
     }
+    for (const Boundary::Tied& tie : boundary_.tied) {
+        if (mass_[tie.field] == 0.0) continue;
+        const double pull = tie.stiffness * lag(tie);
+        force_[tie.field][tie.axis] += pull;
+        reaction_[tie.driver][tie.axis] += pull;
+    }
     for (const Boundary::Held& held : boundary_.held)
         if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
 }
@@ -226,14 +232,18 @@ void Equilibrium::couple_points(bool geometric) {
         });
 }
 
-void Equilibrium::add_pairs() {
+// One of the cells that a node is a corner of.
+int Equilibrium::cell_at(int node) const {
     const Layout& layout = body_.layout;
+    return layout.cell_index(std::min(node % (layout.cells_x + 1), layout.cells_x - 1),
+                             std::min(node / (layout.cells_x + 1), layout.cells_y - 1));
+}
+
+void Equilibrium::add_pairs() {
     pair_stiffness_.resize(cracks_.pairs.size(), Mat2::Zero());
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
-        const int i = std::min(pair.node % (layout.cells_x + 1), layout.cells_x - 1);
-        const int j = std::min(pair.node / (layout.cells_x + 1), layout.cells_y - 1);
-        const int cell = layout.cell_index(i, j);
+        const int cell = cell_at(pair.node);
         Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
         if (const Drag drag = face_drag(k); drag.limit > 0.0) {
             const Vec2 along = left_of(pair.normal);
@@ -246,6 +256,16 @@ void Equilibrium::add_pairs() {
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
         add_extra(cell, std::array{pair.left, pair.right, -1, -1}, both);
+    }
+}
+
+void Equilibrium::add_edge_ties() {
+    for (const Boundary::Tied& tie : boundary_.tied) {
+        if (mass_[tie.field] == 0.0) continue;
+        Eigen::Matrix<double, 8, 8> stiffness = Eigen::Matrix<double, 8, 8>::Zero();
+        stiffness(tie.axis, tie.axis) = tie.stiffness;
+        add_extra(cell_at(cracks_.node_of_field[tie.field]), std::array{tie.field, -1, -1, -1}, stiffness);
+        step_load_[equation_[2 * tie.field + tie.axis]] += tie.stiffness * still_to_go_[tie.driver][tie.axis];
     }
 }
 
@@ -297,6 +317,7 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     lessons_.clear();
     add_lone_points();
     add_pairs();
+    add_edge_ties();
     add_touches(geometric);
     couple_points(geometric);
     for (const int c : touched_cells_) factor_.mark(c);
@@ -443,6 +464,8 @@ double Equilibrium::strain_energy() const {
     double energy = history_ ? internal_force_.energy(displacement_) : points_energy_;  // settled since then
     for (const FieldPair& pair : cracks_.pairs)
         energy += 0.5 * shared_tie(pair, mass_) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
+    for (const Boundary::Tied& tie : boundary_.tied)
+        if (mass_[tie.field] > 0.0) energy += 0.5 * tie.stiffness * lag(tie) * lag(tie);
     return energy;
 }
 
@@ -496,13 +519,14 @@ void Equilibrium::mark_moved_points(const PointTable<int>& before) {
 }
 
 Equilibrium::Snapshot Equilibrium::save() const {
-    return {cracks_, body_.points.node, boundary_.held, pieces_, displacement_, time_, contacts()};
+    return {cracks_, body_.points.node, boundary_.held, boundary_.tied, pieces_, displacement_, time_, contacts()};
 }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
     const PointTable<int> before = std::exchange(body_.points.node, snapshot.node);
     boundary_.held = snapshot.held;
+    boundary_.tied = snapshot.tied;
     pieces_ = snapshot.pieces;
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;

@@ -112,6 +112,7 @@ class Equilibrium {
         CrackFields cracks;
         PointTable<int> node;
         std::vector<Boundary::Held> held;
+        std::vector<Boundary::Tied> tied;
         LoosePieces pieces;
         std::vector<Vec2> displacement;
         double time;
@@ -141,7 +142,9 @@ class Equilibrium {
     template <class Visit>
     void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
+    int cell_at(int node) const;
     void add_pairs();
+    void add_edge_ties();
     void add_touches(bool geometric);
     void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
     void add_touch(const SlidingBody& body, int driver, const SlidingBody::Touch& touch, bool geometric);
@@ -154,6 +157,7 @@ class Equilibrium {
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
     Vec2 place_of(int driver) const { return boundary_.travel(driver, time_) + moved_[driver]; }  // how far it has come [m]
+    double lag(const Boundary::Tied& tie) const { return place_of(tie.driver)[tie.axis] - displacement_[tie.field][tie.axis]; }
     Drag face_drag(std::size_t pair) const;
     std::vector<Vec2> face_forces() const;
     void find_free_bodies();

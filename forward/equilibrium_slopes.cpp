@@ -23,6 +23,7 @@ Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     couple_points(true);
     add_lone_points();
     add_pairs();
+    add_edge_ties();
     add_touches(true);
     spread_.clear();
     std::fill(prescribed_step_.begin(), prescribed_step_.end(), 0.0);
@@ -108,6 +109,16 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
             slope.potential[n] += 0.5 * pull.dot(jump);
             add(n, pair.left, pull);
             add(n, pair.right, -pull);
+        }
+    }
+    for (const Boundary::Tied& tie : boundary_.tied) {
+        if (mass_[tie.field] == 0.0) continue;
+        for (std::size_t n = 0; n < numbers.size(); ++n) {
+            const double stiffer = numbers[n].opening_modulus(tie.place, 0.5 * body_.layout.cell, tie.along) / tie.plane_modulus;
+            const double pull = stiffer * tie.stiffness * lag(tie);
+            slope.potential[n] += 0.5 * pull * lag(tie);
+            slope.fields(2 * tie.field + tie.axis, n) -= pull;
+            slope.drivers(2 * tie.driver + tie.axis, n) += pull;
         }
     }
     // So are bodies' springs.

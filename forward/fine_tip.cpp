@@ -38,6 +38,8 @@ constexpr double near = 3.0, far = 4.0;
 // paper's scenes sound boxes hold 5 % more to 25 % less. About a straight crack that has just left wood 38 times as stiff they
 // hold as little as two fifths, and rightly so.
 constexpr double most_of_coarse = 1.1, least_of_coarse = 0.5;
+// About straight cracks nothing sound comes near these.
+constexpr double far_above_coarse = 1.5, far_below_coarse = 0.2;
 constexpr double least_sharp_turn = 0.5;  // [rad]: from cell to cell a crack turns by 45 degrees
 
 // Between two straight lines that do not cross [m].
@@ -111,11 +113,8 @@ bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, cons
         if (!circle || (circle->centre.cwiseMax(box.low).cwiseMin(box.high) - circle->centre).norm() <= circle->radius)
             return false;
     }
-    for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k) {
-        const auto& points = cracks.lines[k].points;
-        for (std::size_t i = 0; k != crack && i + 1 < points.size(); ++i)
-            if (box.touches({points[i].cwiseMin(points[i + 1]), points[i].cwiseMax(points[i + 1])})) return false;
-    }
+    for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k)
+        if (k != crack && cracks.lines[k].comes_to(box)) return false;
     return true;
 }
 
@@ -141,6 +140,15 @@ bool is_pressed(const Scene& scene, const Discretisation& body, const Box& box, 
         if (pressed) return true;
     }
     return false;
+}
+
+// Whether faces of a crack touch in a box: what is cut out is solved as linear.
+bool touches_itself(const Discretisation& body, const Box& box, const Equilibrium& equilibrium, int crack) {
+    const std::vector<Vec2>& u = equilibrium.displacements();
+    return std::ranges::any_of(equilibrium.cracks().pairs, [&](const FieldPair& pair) {
+        return pair.crack == crack && pair.freed >= 1.0 && box.contains(body.layout.node_position(pair.node)) &&
+               (u[pair.left] - u[pair.right]).dot(pair.normal) < 0.0;
+    });
 }
 
 template <class Visit>
@@ -215,7 +223,7 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
 
 // The one that has been solved with this crack, or one from whose crack it goes on, but for one that is in use: where there is
 // little room two boxes may be the same.
-CutOut& FineTip::cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use) {
+CutOut& FineTip::cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use) {
     auto found = kept_.end();
     std::shared_ptr<CutOutWood> wood;
     for (auto one = kept_.begin(); one != kept_.end(); ++one) {
@@ -242,7 +250,9 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    if (opening <= 0.0 || is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies)) return {};
+    if (opening <= 0.0 || touches_itself(body_, place.boxes[0], equilibrium, crack) ||
+        is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies))
+        return {};
 
     // Small strain: of what is left when the turn of the box as a whole is taken off.
     Mat2 gradient = Mat2::Zero(), turn = Mat2::Identity();
@@ -259,19 +269,20 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     // Down: each box with cells as they are and half as wide.
     std::vector<CutOut*> coarse, fine;
     std::vector<GridView> views{{body_, cracks, displacement, Vec2::Zero(), crack}};
-    double cell = std::sqrt(body_.layout.cell.prod());
+    Vec2 cell = body_.layout.cell;
     MissedEnergy missed;
     for (const Box& box : place.boxes) {
         for (const bool finer : {false, true}) {
-            CutOut& part = cut(box, finer ? 0.5 * cell : cell, line, crack, at_end, fine.empty() ? nullptr : fine.back());
+            CutOut& part = cut(box, finer ? Vec2(0.5 * cell) : cell, line, crack, at_end, fine.empty() ? nullptr : fine.back());
             // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
             const bool solved_there = !finer && (!rotates_ || views.size() > 1);
             if (!part.solve(line, crack, at_end, views.back(), solved_there)) return {};
             (finer ? fine : coarse).push_back(&part);
         }
         const double held = fine.back()->potential(), of = coarse.back()->potential();
-        const bool alike = held >= least_of_coarse * of && held <= most_of_coarse * of;
-        if (!alike && turns_sharply(line, box)) return {};
+        const auto within = [&](double least, double most) { return held >= least * of && held <= most * of; };
+        if (!within(far_below_coarse, far_above_coarse)) return {};
+        if (!within(least_of_coarse, most_of_coarse) && turns_sharply(line, box)) return {};
         missed.energy += place.share * (held - of);
         views.push_back(fine.back()->view());
         cell *= 0.5;

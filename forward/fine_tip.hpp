@@ -49,7 +49,7 @@ class FineTip {
     MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
 
   private:
-    CutOut& cut(const Box& box, double cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use);
+    CutOut& cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use);
 
     const Scene& scene_;
     const MaterialMap& materials_;

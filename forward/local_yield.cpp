@@ -25,7 +25,7 @@ Plan of_box(Plan plan) {
 
 // The box on one grid.
 struct LocalYield::Solved {
-    Solved(const Scene& whole, const Plan& plan, const MaterialMap& wood, const Box& box, double cell)
+    Solved(const Scene& whole, const Plan& plan, const MaterialMap& wood, const Box& box, const Vec2& cell)
         : cut(whole, wood, box, cell), small(of_box(plan)) {
         if (!cut.scene.edges.empty()) equilibrium.emplace(cut.scene, small, cut.materials, cut.body);
     }
@@ -111,9 +111,8 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
     const Vec2 low = (around.low.cwiseQuotient(layout.cell).array() - margin).floor().max(0.0);
     const Vec2 high = (around.high.cwiseQuotient(layout.cell).array() + margin).ceil().min(cells.array());
     const Box box{low.cwiseProduct(layout.cell), high.cwiseProduct(layout.cell)};
-    const double cell = std::sqrt(layout.cell.prod());
-    made->coarse_ = std::make_shared<Solved>(whole, plan, wood, box, cell);
-    made->fine_ = std::make_shared<Solved>(whole, plan, wood, box, cell / finer);
+    made->coarse_ = std::make_shared<Solved>(whole, plan, wood, box, layout.cell);
+    made->fine_ = std::make_shared<Solved>(whole, plan, wood, box, layout.cell / finer);
     if (!made->coarse_->equilibrium || !made->fine_->equilibrium) return nullptr;
 
     // Loads are held by the grid as the wheel's facets are, and on fine cells alone.

@@ -52,12 +52,14 @@ LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cra
         weight[piece[f]] += mass[f];
         if (mass[f] > 0.0) holds.emplace(piece[f], Eigen::Matrix3d::Zero());
     }
-    for (const Boundary::Held& h : boundary.held) {
-        if (mass[h.field] == 0.0) continue;
+    const auto take_in = [&](const auto& h) {
+        if (mass[h.field] == 0.0) return;
         held[2 * h.field + h.axis] = true;
         const Eigen::Vector3d row = motion(h.field, h.axis);
         holds.at(piece[h.field]) += row * row.transpose();
-    }
+    };
+    std::ranges::for_each(boundary.held, take_in);
+    std::ranges::for_each(boundary.tied, take_in);
     for (std::size_t f = 0; f < piece.size(); ++f) left_alone[f] = weight[f] > heaviest;
     for (const Boundary::Traction& t : boundary.tractions) left_alone[piece[body.points.node[t.facet.point][0]]] = true;
 

@@ -47,6 +47,40 @@ constexpr double seconds_per_node = 7e-8;
 // Point steps a second on one core, for the estimate of seconds only; `benchmark_forward` measures it.
 constexpr double expected_speed = 4e7;
 
+// Of wood that is much stiffer than other so much has to fill whole cells of a grid twice as coarse, as it does in layers of two
+// of these: of thinner ones the coarse grid's error does not go with the square of its cell, and may have the other sign.
+constexpr double least_resolved = 0.7;
+constexpr double much_stiffer = 4.0;
+
+bool resolves_woods(const Discretisation& body) {
+    const Layout& layout = body.layout;
+    double stiffest = 0.0, softest = std::numeric_limits<double>::infinity();
+    const auto stiffness = [&](int c) {
+        if (body.points.first_of_cell[c] == body.points.first_of_cell[c + 1]) return 0.0;
+        return std::max(body.points.stiffness[c][0], body.points.stiffness[c][2]);
+    };
+    for (int c = 0; c < layout.cells(); ++c) {
+        if (stiffness(c) == 0.0) continue;
+        stiffest = std::max(stiffest, stiffness(c));
+        softest = std::min(softest, stiffness(c));
+    }
+    if (stiffest < much_stiffer * softest) return true;
+    int all = 0, whole = 0;
+    for (int j = 0; j < layout.cells_y; j += 2)
+        for (int i = 0; i < layout.cells_x; i += 2) {
+            int stiff = 0, wood = 0;
+            for (int y = j; y < std::min(j + 2, layout.cells_y); ++y)
+                for (int x = i; x < std::min(i + 2, layout.cells_x); ++x) {
+                    const double here = stiffness(layout.cell_index(x, y));
+                    stiff += here >= 0.5 * stiffest;
+                    wood += here > 0.0;
+                }
+            all += stiff;
+            if (stiff == wood) whole += stiff;
+        }
+    return whole >= least_resolved * all;
+}
+
 void refuse(const Scene& scene, const std::string& key, const std::string& value, const std::string& rule) {
     throw InputError(scene.file.string(), key, value, rule);
 }
@@ -338,17 +372,24 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const bool fine_enough = std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells &&
                              least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
     const bool may_meet = plan.grows && scene.cracks.size() > 1;
-    plan.extrapolates = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
+    const bool may_extrapolate = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
+    plan.extrapolates = may_extrapolate && resolves_woods(body);
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
                : plan.remembers  ? "wood that remembers: errors of time and of the grid do not go together"
                : may_meet
                    ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
+               : may_extrapolate ? "layers of the stiffest wood are less than two cells of a second, twice as coarse, wide: its "
+                                   "error would not tell"
                : scene.solver.extrapolate
                    ? fmt::format("a second, twice as coarse, would have less than {} cells a side or a cell wider than `advance`",
                                  least_coarse_cells)
                    : "solver.extrapolate is false");
+    if (plan.quasistatic && plan.grows && least_advance > 0.0 && least_advance < body.layout.cell.minCoeff() * (1.0 - 1e-6))
+        choose("advance", "shorter than a cell",
+               "what is released over less than a cell goes in steps with the grid: the load comes out too high, by some 7 % for "
+               "half a cell and more for less; 0 takes G at the tip instead, or take finer cells");
     if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) &&
         least_advance > 0.0)
         choose("tips near sharp boundaries", "boxes with finer cells around them",

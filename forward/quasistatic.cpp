@@ -22,6 +22,9 @@ constexpr double increment_in_cells = 0.5;
 // high.
 constexpr int least_stations_in_advance = 2, least_stations_where_cheap = 4, least_stations_in_peak = 8;
 
+// No specimen has more of them on a crack's way, whatever the advance.
+constexpr double most_stations = 1e9;
+
 // Into how many steps the loading of a scene that is not linear is divided.
 constexpr int loading_steps = 32;
 
@@ -74,10 +77,9 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     const int least_stations = plan.linear && growing_tips(scene) == 1 ? least_stations_where_cheap : least_stations_in_advance;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
         const Crack& crack = scene.cracks[k];
-        std::size_t ahead = 0;
-        if (crack.advance > 0.0)
-            ahead = std::max<std::size_t>(least_stations, std::lround(std::ceil(crack.advance / cell - 1e-6)));
-        const double increment = ahead > 0 ? crack.advance / static_cast<double>(ahead) : increment_in_cells * cell;
+        const double stations = std::max<double>(least_stations, std::ceil(crack.advance / cell - 1e-6));
+        const std::size_t ahead = crack.advance > 0.0 ? static_cast<std::size_t>(std::min(stations, most_stations)) : 0;
+        const double increment = ahead > 0 ? crack.advance / stations : increment_in_cells * cell;
         if (crack.grows == Growth::start || crack.grows == Growth::both) growing_.push_back({k, false, increment, ahead});
         if (crack.grows == Growth::end || crack.grows == Growth::both) growing_.push_back({k, true, increment, ahead});
     }
@@ -116,7 +118,7 @@ int Quasistatic::start_of_advance(int end) const {
     int place = places_[end].parent;
     if (place < 0 || step.tips == 0) return -1;
     const auto go_back = [&] { place = place >= 0 && places_[place].step == Step{step.tips} ? places_[place].parent : -1; };
-    for (std::size_t k = 1; k < growing_[std::countr_zero(step.tips)].ahead; ++k) go_back();
+    for (std::size_t k = 1; place >= 0 && k < growing_[std::countr_zero(step.tips)].ahead; ++k) go_back();
     if (step.quarters == Step{}.quarters) return place;
     go_back();
     if (place < 0) return -1;

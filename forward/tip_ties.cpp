@@ -37,6 +37,7 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
             tie.waits = !at_rest;
             tie.softness = softness;
             if (!at_rest) tie.from = std::max(0.0, pair.freed);
+            tie.pulled_at = share(tie, pair.freed);
         }
         if (pair.freed >= 1.0 || left == 0.0 || right == 0.0 || !std::isfinite(pair.compliance)) continue;
         live_.push_back(k);
@@ -44,7 +45,9 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
         const double shared = 4.0 * left * right / ((left + right) * (left + right));
         const double f = share(tie, pair.freed);
         const Vec2 jump = jump_of(pair, displacement);
-        const Vec2 before = k < known && !tie.waits ? Vec2(stiffness(tie, f) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
+        if (k < known && tie.compliance == 0.0) tie.waits = true;  // there was no wood on one side
+        const Vec2 before =
+            k < known && !tie.waits ? Vec2(stiffness(tie, tie.pulled_at) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
         const double compliance = tie.softness * pair.compliance / shared;
         const double most = most_frequency_squared_ * left * right / (left + right);
         const double slack = std::max(k < known ? tie.slack : 0.0, (1.0 - f) / (most * compliance) - f);
@@ -69,11 +72,12 @@ void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass,
     }
 }
 
-void TipTies::pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
+void TipTies::pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
     for (const std::size_t k : live_) {
         const FieldPair& pair = cracks.pairs[k];
-        const Tie& tie = ties_[k];
-        const Vec2 pull = stiffness(tie, share(tie, pair.freed)) * (jump_of(pair, displacement) + tie.stretch);
+        Tie& tie = ties_[k];
+        tie.pulled_at = share(tie, pair.freed);
+        const Vec2 pull = stiffness(tie, tie.pulled_at) * (jump_of(pair, displacement) + tie.stretch);
         force[pair.left] -= pull;
         force[pair.right] += pull;
     }

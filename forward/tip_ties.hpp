@@ -33,7 +33,7 @@ class TipTies {
     void settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force);
 
     /// Adds the ties' forces to those of the fields [N].
-    void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+    void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
 
     double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const;  // [J]
 
@@ -55,6 +55,7 @@ class TipTies {
     struct Tie {
         bool waits = false;     // for the force that it starts with
         double from = 0;        // share of the way that the tip had gone when the tie came up
+        double pulled_at = 0;   // and since then, when it pulled last: a crack that turns may have less of it
         double compliance = 0;  // c [m/N]
         double slack = 0;       // s
         double softness = 1;

@@ -24,11 +24,13 @@ struct Moment {
     double fracture_energy = 0;             // [J]
 };
 
+// On a straight line, as forces and displacements go; energies bend as the work of such forces does.
 LoadState mixed(const LoadState& a, const LoadState& b, double s) {
     LoadState mix = a;
     const auto blend = [&](auto& to, const auto& from) { to += s * (from - to); };
     blend(mix.time, b.time);
     blend(mix.potential, b.potential);
+    mix.potential -= 0.5 * s * (1.0 - s) * (b.power - a.power) * (b.time - a.time);
     blend(mix.power, b.power);
     blend(mix.traction_work, b.traction_work);
     blend(mix.dissipated, b.dissipated);

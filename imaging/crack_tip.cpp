@@ -26,7 +26,8 @@ constexpr int least_points = 60;  // four times the series' coefficients
 // without a crack reach some 10.
 constexpr double least_gain = 50;
 constexpr double most_torn = 0.9;      // share of the torn subsets that the crack must have torn
-constexpr std::size_t least_torn = 8;  // of them that say anything
+constexpr std::size_t least_torn = 8;  // of them, beside each other, that say anything
+constexpr double strained = 4.0;  // reach of the strain about the tip that tears a subset, in half widths of one: a judgement
 
 // Of the search for the tip.
 constexpr int most_iterations = 40;
@@ -140,22 +141,39 @@ double scan_score(const std::vector<Sample>& samples, const Line& line, double a
     return std::isfinite(left) ? left / (2 * (count - terms)) : std::numeric_limits<double>::infinity();
 }
 
-/// Places whose subsets were torn, as a crack does it.
+/// Places whose subsets were torn, as a crack does it: many beside each other. Others are lost here and there.
 std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementField& field) {
+    std::vector<bool> open(static_cast<std::size_t>(lattice.count()));
+    for (std::size_t point = 0; point < open.size(); ++point) {
+        const PointStatus status = field.status[point];
+        open[point] =
+            status == PointStatus::moved_apart || status == PointStatus::low_correlation || status == PointStatus::no_convergence;
+    }
     std::vector<Vec2> torn;
-    for (int point = 0; point < lattice.count(); ++point) {
-        const PointStatus status = field.status[static_cast<std::size_t>(point)];
-        if (status == PointStatus::moved_apart || status == PointStatus::low_correlation || status == PointStatus::no_convergence)
-            torn.emplace_back(lattice.x(point), lattice.y(point));
+    for (int start = 0; start < lattice.count(); ++start) {
+        std::vector<int> patch;
+        const auto take = [&](int point) {
+            if (open[static_cast<std::size_t>(point)]) patch.push_back(point);
+            open[static_cast<std::size_t>(point)] = false;
+        };
+        take(start);
+        for (std::size_t next = 0; next < patch.size(); ++next) {
+            const int column = patch[next] % lattice.columns, row = patch[next] / lattice.columns;
+            for (int y = std::max(0, row - 1); y <= std::min(row + 1, lattice.rows - 1); ++y)
+                for (int x = std::max(0, column - 1); x <= std::min(column + 1, lattice.columns - 1); ++x)
+                    take(y * lattice.columns + x);
+        }
+        if (patch.size() < least_torn) continue;
+        for (const int point : patch) torn.emplace_back(lattice.x(point), lattice.y(point));
     }
     return torn;
 }
 
-/// Whether a crack along the line tears most of the subsets that were torn.
+/// Whether a crack along the line tears most of the subsets that were torn, or strains them about its tip.
 bool tears(const Line& line, const std::vector<Vec2>& torn, double width) {
     const auto count = std::ranges::count_if(torn, [&](const Vec2& place) {
         const Vec2 local = line.local(place);
-        return local.x() < width && std::abs(local.y()) < width;
+        return (local.x() < width && std::abs(local.y()) < width) || local.norm() < strained * width;
     });
     return static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
 }

@@ -23,8 +23,7 @@ constexpr double resolved = 1e-3;
 // cell, nor slopes at the best point for the way there.
 constexpr double farthest_told = 0.1;
 
-// Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
-double share_of_grids(const Scene& scene) { return KeptWalk(scene).extrapolates() ? 0.75 : 1.0; }
+bool has_two_grids(const Experiment& experiment) { return KeptWalk(experiment.scene).extrapolates(); }
 
 // What a parameter's shifts are large or small beside, SI: its value, and where that may be near 0 half of its box.
 double size_of(const Parameter& parameter, double value) {
@@ -78,7 +77,8 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
     const std::vector<FitResidual> after = model.residuals(here);
     std::map<std::string, double> share;
     for (const Experiment& experiment : study.experiments) {
-        share[experiment.name] = share_of_grids(experiment.scene);
+        // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
+        share[experiment.name] = has_two_grids(experiment) ? 0.75 : 1.0;
     }
     Eigen::VectorXd change = wide.residuals - here.residuals;
     Eigen::MatrixXd slope = about.slope;
@@ -90,7 +90,9 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
     return least_squares(slope, change);
 }
 
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left) {
+bool goes_one_way(const Study& study) { return std::ranges::all_of(study.experiments, has_two_grids); }
+
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left, bool one_way) {
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
     bool is_near = true;
@@ -108,7 +110,12 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     Eigen::VectorXd own(box.size());  // in the parameters' units
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
-        go_on(box, j, left[j] < 0 ? fitted.lower_95 : fitted.upper_95, left[j]);
+        if (!one_way || left[j] < 0) {
+            go_on(box, j, fitted.lower_95, -std::abs(left[j]));
+        }
+        if (!one_way || left[j] > 0) {
+            go_on(box, j, fitted.upper_95, std::abs(left[j]));
+        }
         own[j] = slope_in_unit(box, j, x) * left[j];
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
@@ -116,8 +123,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
     fit.message +=
         fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
-                    "Intervals take that in on its side; it makes up to {:.0f} % of a variance. ",
-                    fmt::join(told, ", "), 100 * most);
+                    "Intervals take that in {}; it makes up to {:.0f} % of a variance. ",
+                    fmt::join(told, ", "), one_way ? "on its side" : "on both sides", 100 * most);
 }
 
 void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why) {

@@ -15,17 +15,20 @@ namespace crampfit {
 /// them (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
 /// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,
 /// Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116), which takes in errors that go
-/// with the first power of the cell. The errors of both grids go the same way, so that it counts against m only. A scene that
-/// takes a third of the difference of both grids off has moved away from the wide one by four thirds of that difference: there
-/// three quarters of g count.
+/// with the first power of the cell. Where each scene's grid resolves its woods twice over, the errors of both go the same way,
+/// so that it counts against m only. A scene that takes a third of the difference of both grids off has moved away from the wide
+/// one by four thirds of that difference: there three quarters of g count.
 ///
 /// `about` tells of the best point.
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
 
-/// Takes what the grid leaves into the fit: each interval goes on by it on its side, and covariance and standard errors count it
-/// as spread evenly up to there, squares about the best point. Where it goes beyond a tenth of a parameter's value or, on a
-/// linear scale, of half its box if that is more, it cannot be told. The message says it.
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left);
+/// Whether both grids' errors go the same way: every scene has a second grid.
+bool goes_one_way(const Study& study);
+
+/// Takes what the grid leaves into the fit: each interval goes on by it on its side or, unless it goes one way, on both, and
+/// covariance and standard errors count it as spread evenly up to there, squares about the best point. Where it goes beyond a
+/// tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told. The message says it.
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left, bool one_way);
 
 /// Where what the grid leaves cannot be told, and why: all intervals go on by that tenth to either side, and errors spread evenly
 /// up to there count, each parameter's by itself.

@@ -76,6 +76,33 @@ TEST(SystemCommand, EvaluateGivesOutputsAndTheirGradients) {
     EXPECT_NEAR(n[0], peak, 1e-9 * peak);
     ASSERT_EQ(command.evaluate(request("90", "60", {0, 1})).status, 0);
     EXPECT_EQ(command.numbers(), std::vector<double>{n[1]});
+    // An output that the run does not have matters only where it is asked for.
+    command.folder.write("study.toml", "scene = \"scene.toml\"\noutputs = [\"peak force\", \"arrest length 1\"]\n" + parameters);
+    ASSERT_EQ(command.evaluate(request("90", "60", {1, 0})).status, 0);
+    EXPECT_EQ(command.numbers(), std::vector<double>{n[0]});
+    EXPECT_EQ(command.evaluate(request("90", "60", {1, 1})).status, 1);
+}
+
+TEST(SystemCommand, NoResultGoesOverAFileThatIsRead) {
+    Evaluator command;
+    command.folder.write("scene.toml", slow_scene());
+    command.folder.write("data.csv", "displacement [mm],force [N]\n0,0\n0.1,3\n0.2,5\n0.3,8\n");
+    command.folder.write("study.toml",
+                         "[[experiments]]\nscene = \"scene.toml\"\ndata = \"data.csv\"\nnoise = { force = \"0.1 N\" }\n" +
+                             parameters);
+    command.folder.write("params.in", request("90", "60", {1}));
+    const auto refused = [&](const std::vector<std::string>& words, const std::string& file) {
+        const std::string before = command.folder.read(file);
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << file;
+        EXPECT_TRUE(contains(outcome.error, "must not be a file that is read")) << outcome.error;
+        EXPECT_EQ(command.folder.read(file), before);
+    };
+    const std::string study = command.path("study.toml"), scene = command.path("scene.toml");
+    refused({"fit", study, "-o", scene}, "scene.toml");
+    refused({"fit", study, "-o", command.path("data.csv")}, "data.csv");
+    refused({"evaluate", study, command.path("params.in"), command.path("params.in")}, "params.in");
+    refused({"simulate", scene, "-o", command.path("r.h5"), "--log", scene}, "scene.toml");
 }
 
 TEST(SystemCommand, EvaluateGivesResidualsOrTheirSquaresSummed) {

@@ -253,7 +253,7 @@ TEST(SystemReport, RefusesWhatItCannotReportAndNeverHarmsItsInput) {
     refused("absent.h5", "page.html", "does not exist");
     refused("scene.toml", "page.html", "HDF5");
     refused("specimen.h5", "page.html", "must be a record, a fit or a sensitivity study");
-    refused("fit.h5", "fit.h5", "must not be the file that is read");
+    refused("fit.h5", "fit.h5", "must not be a file that is read");
     refused("fit.h5", "no/such/folder/page.html", "folder");
     EXPECT_EQ(command.run({"report", command.path("fit.h5"), "-o", command.path("page.html"), "--set", "a=1"}).status, 2);
     EXPECT_EQ(command.folder.read("fit.h5"), before);

@@ -189,6 +189,7 @@ TEST(UnitPlan, RefusesWhatItCannotDo) {
         },
         "solver.shape_function");
     refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
+    refused([](Scene& s) { s.model.cell = 1e-23; }, "model.cell");
 }
 
 }  // namespace

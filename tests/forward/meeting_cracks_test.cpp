@@ -73,6 +73,24 @@ TEST(HardMeeting, ACrackThatRunsIntoAnotherCutsABlockFree) {
     }
 }
 
+// The two cut points off from a node together that neither has cut off alone.
+TEST(HardMeeting, TwoEdgeCracksConverge) {
+    Scene scene = at_equilibrium(block({6.16e-3, 8.36e-3}, 0.22e-3));
+    scene.specimen.cutouts = {Circle{{0.53e-3, 3.6e-3}, 0.68e-3}};
+    scene.edges = {moving("top", Side::top, {3e-6, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.cracks = {line({0, 6.143}, {2.105, 5.457}, Growth::end), line({0, 5.419}, {2.179, 5.419}, Growth::end)};
+    for (Crack& crack : scene.cracks) {
+        crack.advance = 0.5e-3;
+        crack.direction = GrowthDirection::normal_to_opening;
+    }
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 0.3344e-3;
+    const Record record = simulate(scene);
+    std::printf("%s\n", record.message.c_str());
+    EXPECT_GT(record.series.back().crack_length, record.series.front().crack_length);
+    for (const Instant& row : record.series) EXPECT_TRUE(std::isfinite(row.force));
+}
+
 TEST(HardMeeting, TwoEdgeCracksMeetHeadOn) {
     for (const double shift : {0.0, 0.37}) {
         for (const double right : {14.0, 15.5}) {

@@ -85,6 +85,33 @@ double critical_of_strip(double nu, double toughness) {
     return 10e-3 * std::sqrt(toughness / (modulus * 5e-3));
 }
 
+// What is linear and driven by a displacement holds half of force times displacement, also between two stations far apart.
+TEST(VerificationWalk, EveryRowHoldsHalfOfForceTimesDisplacement) {
+    Scene scene = at_equilibrium(ring_specimen(2.5e-3, 0.5e-3));
+    scene.solver.damping = 0.0;
+    scene.stop = {};
+    scene.stop.displacement = 0.2e-3;
+    scene.edges[0] = moving("top", Side::top, {0.0, mm_per_minute});
+    scene.cracks = {straight({10e-3, 5e-3}, {7.5e-3, 5e-3}, 1e-3)};
+    const Record record = simulate(scene);
+    double worst = 0.0, largest = 0.0;
+    for (const Instant& row : record.series) {
+        worst = std::max(worst, std::abs(row.strain_energy - 0.5 * row.force * row.displacement));
+        largest = std::max(largest, row.strain_energy);
+    }
+    std::printf("crack of %.2f to %.2f mm: energy in a row within %.1e\n", 1e3 * record.series.front().crack_length,
+                1e3 * record.series.back().crack_length, worst / largest);
+    EXPECT_GT(record.series.back().crack_length, 3e-3);
+    EXPECT_LT(worst, 1e-9 * largest);
+}
+
+TEST(VerificationWalk, AnAdvanceLongerThanTheSpecimenEnds) {
+    Scene scene = strip(0.33);
+    scene.cracks[0].advance = 1e7;  // [m]
+    const Record record = simulate(scene);
+    EXPECT_EQ(record.status, RunStatus::split) << record.message;
+}
+
 TEST(VerificationWalk, AStripCracksAtTheExactDisplacement) {
     for (const double nu : {0.0, 0.33}) {
         const Record record = simulate(strip(nu));

@@ -112,6 +112,12 @@ TEST(GradientRecord, AcrossRings) {
     check("linear", across_rings(0.4e-3), 1e-4, 1e-5);
 }
 
+TEST(GradientRecord, BetweenGripsThatEndInWood) {
+    Scene scene = across_rings(0.4e-3);
+    for (Edge& edge : scene.edges) edge.range = {{1.1e-3, 9.1e-3}};
+    check("grips that end in wood", scene, 1e-4, 1e-5);
+}
+
 TEST(GradientRecord, WhereTheTipsOwnGSaysWhenItMoves) {
     // Advance 0: G at the tip, by J in wood that is the same all about it and near boundaries by K.
     for (const double transition : {0.3e-3, 0.0}) {

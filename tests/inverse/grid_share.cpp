@@ -74,7 +74,7 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
                                   .upper_95 = box.value(j, x[j] + 0.1)});
     }
     fit.covariance = Eigen::Vector2d(4, 9).asDiagonal();
-    take_in_grid(fit, box, x, left);
+    take_in_grid(fit, box, x, left, true);
     EXPECT_DOUBLE_EQ(fit.parameters[0].lower_95, box.value(0, 0.4));
     EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.61), 1e-9);
     EXPECT_NEAR(fit.parameters[1].lower_95, box.value(1, 0.28), 1e-9);
@@ -89,7 +89,7 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
     // By more than a tenth of a value: no slope tells that, and a tenth to either side is the least. d/3 for each as above.
     const Fit before = fit;
-    take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06));
+    take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06), true);
     for (int j = 0; j < 2; ++j) {
         const double tenth = 0.1 * box.value(j, x[j]), share = tenth / box.slope(j, x[j]);
         const FittedParameter &was = before.parameters[j], &is = fit.parameters[j];
@@ -114,10 +114,11 @@ TEST(UnitGridShare, TellsShiftsOfParametersNearZeroInTheirUnit) {
         Fit fit;
         fit.parameters.push_back({.name = "slack", .key = "", .value = 0, .unit = "um", .lower_95 = -1, .upper_95 = 1});
         fit.covariance = Eigen::MatrixXd::Identity(1, 1);
-        take_in_grid(fit, box, Eigen::VectorXd::Constant(1, 0.5), Eigen::VectorXd::Constant(1, shift / 100e-6));
+        take_in_grid(fit, box, Eigen::VectorXd::Constant(1, 0.5), Eigen::VectorXd::Constant(1, shift / 100e-6), false);
         return fit;
     };
     const Fit told = fit_after(4e-6), untold = fit_after(6e-6);
+    EXPECT_NEAR(told.parameters[0].lower_95, -5, 1e-9);  // not one way: on both sides
     EXPECT_NEAR(told.parameters[0].upper_95, 5, 1e-9);
     EXPECT_NEAR(told.covariance(0, 0), 1 + 16.0 / 3, 1e-9);
     EXPECT_NE(told.message.find("'slack' +4 um."), std::string::npos) << told.message;

@@ -1,0 +1,109 @@
+// Stretches of a side that end in wood, wherever that is in a cell.
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace crampfit::test {
+namespace {
+
+constexpr double speed = 1e-3 / 60.0;
+
+// Lower and left side are planes of symmetry, the lower one where it is held: right of a crack that ends at `tip`.
+Scene upper_half(double tip, double cell) {
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, cell));
+    Edge top = moving("top", Side::top, {0.0, speed}), bottom = moving("bottom", Side::bottom, {0.0, 0.0});
+    Edge left = moving("left", Side::left, {0.0, 0.0});
+    top.velocity[0] = bottom.velocity[0] = left.velocity[1] = std::nullopt;
+    bottom.range = {{tip, 10e-3}};
+    scene.edges = {top, bottom, left};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 0.1e-3;
+    return scene;
+}
+
+// The same with the lower half and the crack.
+Scene both_halves(double tip, double cell) {
+    Scene scene = upper_half(tip, cell);
+    scene.specimen.size.y() = 20e-3;
+    scene.edges[1].range.reset();
+    Crack crack;
+    crack.points = {Vec2(0.0, 10e-3), Vec2(tip, 10e-3)};
+    scene.cracks = {crack};
+    scene.stop.displacement = 0.2e-3;
+    return scene;
+}
+
+double force(const Scene& scene) { return simulate(scene).series.back().force; }
+
+TEST(VerificationHeldStretch, IsHalfACrackWhereverInACellItEnds) {
+    double worst = 0.0;
+    for (int k = 0; k <= 10; ++k) {
+        const double tip = 4e-3 + 0.05e-3 * k;
+        worst = std::max(worst, std::abs(force(upper_half(tip, 0.5e-3)) / force(both_halves(tip, 0.5e-3)) - 1));
+    }
+    std::printf("force of a half whose lower side is free for 4 to 4.5 mm, against the whole with a crack: within %.1e\n", worst);
+    EXPECT_LT(worst, 1e-9);
+}
+
+TEST(VerificationHeldStretch, IsHalfACrackWhereItTurnsFar) {
+    const auto far = [](Scene scene) {
+        scene.stop.displacement = 20 * *scene.stop.displacement;
+        return simulate(scene);
+    };
+    const Record half = far(upper_half(4.1e-3, 0.5e-3)), whole = far(both_halves(4.1e-3, 0.5e-3));
+    const double off = half.series.back().force / whole.series.back().force - 1;
+    std::printf("drawn out by a fifth: within %.1e; energy books within %.1e\n", std::abs(off), half.worst_energy_imbalance);
+    EXPECT_LT(std::abs(off), 1e-6);
+    EXPECT_LT(half.worst_energy_imbalance, 1e-3);
+}
+
+// Held across and along, on which its end is not quite a crack's: against cells of an eighth.
+TEST(VerificationHeldStretch, OfAClampConverges) {
+    const auto clamped = [](double cell) {
+        Scene scene = upper_half(4e-3, cell);
+        scene.edges[1].velocity[0] = 0.0;
+        scene.solver.extrapolate = false;
+        return force(scene);
+    };
+    const double exact = clamped(0.0625e-3);
+    for (const auto& [cell, bar] : {std::pair{0.5e-3, 0.003}, {0.25e-3, 0.0015}}) {
+        const double off = clamped(cell) / exact - 1;
+        std::printf("clamp on %.2f mm cells: %+.2f %%\n", 1e3 * cell, 100 * off);
+        EXPECT_LT(std::abs(off), bar);
+    }
+}
+
+TEST(UnitHeldStretch, NextToAnotherOneHoldsOn) {
+    // Two clamps side by side that go the same way are one.
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.5e-3));
+    scene.edges = {moving("top", Side::top, {0.0, speed}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 0.1e-3;
+    const double exact = force(scene);
+    Edge right = moving("right of it", Side::bottom, {0.0, 0.0});
+    scene.edges[1].range = {{0.0, 5.1e-3}};
+    right.range = {{5.1e-3, 10e-3}};
+    scene.edges.push_back(right);
+    EXPECT_NEAR(force(scene), exact, 1e-9 * exact);
+}
+
+TEST(UnitHeldStretch, TractionActsOnAllOfIt) {
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
+    Edge top{"top", Side::top, {}, {}, {}, {}};
+    top.traction = Vec2(0.0, 1e4);
+    scene.edges = {top, moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"bottom", "top"};
+    scene.stop.time = 1.0;
+    for (const auto& [from, to] : {std::pair{0.0, 10e-3}, {2.03e-3, 7.41e-3}, {3.1e-3, 3.2e-3}}) {
+        scene.edges[0].range = {{from, to}};
+        const Record record = simulate(scene);
+        const double load = 1e4 * (to - from) * scene.model.thickness;
+        EXPECT_NEAR(record.reactions[1].force.back().y(), -load, 1e-7 * load) << from;
+    }
+}
+
+}  // namespace
+}  // namespace crampfit::test
