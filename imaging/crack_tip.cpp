@@ -25,7 +25,7 @@ constexpr int least_points = 60;  // four times the series' coefficients
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
-constexpr double most_torn = 0.9;      // share of the torn subsets that the crack must have torn
+constexpr double most_torn = 0.7;      // share of the torn subsets that the crack must have torn
 constexpr std::size_t least_torn = 8;  // of them, beside each other, that say anything
 constexpr double strained = 4.0;  // reach of the strain about the tip that tears a subset, in half widths of one: a judgement
 
@@ -169,13 +169,15 @@ std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementFie
     return torn;
 }
 
-/// Whether a crack along the line tears most of the subsets that were torn, or strains them about its tip.
+/// Whether a crack along the line tears most of the subsets that were torn, or strains them about its tip, up to which some are.
 bool tears(const Line& line, const std::vector<Vec2>& torn, double width) {
+    bool up_to_tip = false;
     const auto count = std::ranges::count_if(torn, [&](const Vec2& place) {
         const Vec2 local = line.local(place);
+        up_to_tip = up_to_tip || (std::abs(local.y()) < width && local.x() > -2.0 * width);
         return (local.x() < width && std::abs(local.y()) < width) || local.norm() < strained * width;
     });
-    return static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
+    return up_to_tip && static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
 }
 
 /// The motion apart of what lies to either side of a place of the line, which has its origin there; none where nothing does.
