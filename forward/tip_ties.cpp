@@ -46,8 +46,9 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
         const double f = share(tie, pair.freed);
         const Vec2 jump = jump_of(pair, displacement);
         if (k < known && tie.compliance == 0.0) tie.waits = true;  // there was no wood on one side
-        const Vec2 before =
-            k < known && !tie.waits ? Vec2(stiffness(tie, tie.pulled_at) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
+        // A tip that has turned back to the beginning of the way past a pair would be held by a rigid tie: then by the last one.
+        const double held_at = f + tie.slack > 0.0 ? f : tie.pulled_at;
+        const Vec2 before = k < known && !tie.waits ? Vec2(stiffness(tie, held_at) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
         const double compliance = tie.softness * pair.compliance / shared;
         const double most = most_frequency_squared_ * left * right / (left + right);
         const double slack = std::max(k < known ? tie.slack : 0.0, (1.0 - f) / (most * compliance) - f);
