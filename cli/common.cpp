@@ -44,12 +44,13 @@ Overrides overrides_of(const CommonOptions& common) {
     return overrides;
 }
 
-void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs) {
-    if (output.empty()) throw InputError("command line", "-o", "", "must be the name of a file");
+void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs,
+                  const std::string& option) {
+    if (output.empty()) throw InputError("command line", option, "", "must be the name of a file");
     std::error_code neither_exists;
     for (const std::filesystem::path& input : inputs)
         if (std::filesystem::equivalent(output, input, neither_exists))
-            throw InputError("command line", "-o", output.string(), "must not be a file that is read");
+            throw InputError("command line", option, output.string(), "must not be a file that is read");
     require_writable(output);
 }
 
@@ -64,6 +65,7 @@ std::vector<std::filesystem::path> files_of(const Study& study) {
     for (const Experiment& experiment : study.experiments) {
         files.push_back(experiment.data_file);
         if (experiment.fields) files.push_back(experiment.fields->file);
+        if (const auto& photograph = experiment.photograph) files.insert(files.end(), {photograph->file, photograph->track});
     }
     for (const Scene* scene : scenes_of(study))
         for (const std::filesystem::path& file : files_of(*scene)) files.push_back(file);

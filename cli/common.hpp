@@ -33,7 +33,8 @@ void add_common_options(CLI::App& command, CommonOptions& common);
 Overrides overrides_of(const CommonOptions& common);
 
 /// Throws InputError unless a result can be saved there without harm to what is read.
-void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
+void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs,
+                  const std::string& option = "-o");
 
 /// The files that a scene, or a study and its scenes, are read from.
 std::vector<std::filesystem::path> files_of(const Scene& scene);

@@ -51,7 +51,10 @@ void check_series(const PictureSeries& series, const CommonOptions& common) {
     read.insert(read.end(), {series.reference, series.mask});
     check_output(series.output, read);
     series.options.validate();
-    if (!series.preview.empty()) require_picture_name(series.preview, "--preview");
+    if (!series.preview.empty()) {
+        check_output(series.preview, read, "--preview");
+        require_picture_name(series.preview, "--preview");
+    }
 }
 
 std::optional<double> pixel_of(const PictureSeries& series) {

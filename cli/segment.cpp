@@ -107,7 +107,7 @@ ExitStatus segment_and_save(const Arguments& arguments, const CommonOptions& com
     const std::vector<std::filesystem::path> read{arguments.image, arguments.borders, arguments.density, arguments.direction};
     check_output(arguments.output, read);
     if (!arguments.preview.empty()) {
-        check_output(arguments.preview, read);
+        check_output(arguments.preview, read, "--preview");
         check_preview_name(arguments.preview);
     }
     keep_memory();

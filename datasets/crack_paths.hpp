@@ -21,7 +21,8 @@ struct PlanePicture {
 
 /// What a test's pictures show of its crack.
 struct Photograph {
-    std::filesystem::path file;  // of one of them, to be drawn; empty: none
+    std::filesystem::path file;        // of one of them, to be drawn; empty: none
+    std::filesystem::path track = {};  // that `path` comes from; empty: none
     Placement placement;
     std::vector<Vec2> path;     // of the crack, in the specimen [m]; empty: not known
     int columns = 0, rows = 0;  // of the pictures that it was tracked in [px]; 0: none

@@ -40,7 +40,8 @@ Photograph read_photograph(const Entry& entry, const Scene& scene) {
         photograph.placement = read_placement(entry, {}, 0);
         return photograph;
     }
-    const CrackTrack track = read_crack_track(file->existing_file());
+    photograph.track = file->existing_file();
+    const CrackTrack track = read_crack_track(photograph.track);
     if (track.rows == 0) {
         file->fail("the file does not know the size of the pictures: track the crack again");
     }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -92,6 +93,16 @@ std::string head(std::uint64_t study) {
     return bytes;
 }
 
+/// Whether a file's first entry, which may be torn, is a head of whatever study.
+bool begins_as_ours(std::string_view bytes) {
+    const std::string ours = entry(head(0));
+    const auto alike = [&](std::size_t first, std::size_t count) {
+        const std::size_t from = std::min(first, bytes.size());
+        return bytes.substr(from, count) == std::string_view(ours).substr(from, std::min(count, bytes.size() - from));
+    };
+    return alike(0, sizeof(std::uint64_t)) && alike(2 * sizeof(std::uint64_t), title.size());
+}
+
 }  // namespace
 
 RunJournal::RunJournal(const std::filesystem::path& file, std::uint64_t study, bool resume) : file_(file) {
@@ -106,8 +117,7 @@ RunJournal::RunJournal(const std::filesystem::path& file, std::uint64_t study, b
         }
         const std::string bytes = read_text(file);
         // What is not ours, by the name or for the study, is not touched.
-        const bool torn_head = bytes.size() < entry(head(study)).size();
-        if (!torn_head && bytes.compare(2 * sizeof(std::uint64_t), title.size(), title) != 0) {
+        if (!begins_as_ours(bytes)) {
             throw InputError(file.string(), "", "", "does not hold runs: another name is needed for -o");
         }
         const std::size_t whole = resume ? read(bytes, study) : 0;

@@ -247,6 +247,9 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file, co
     if (scene.measure.displacement.empty() && !scene.stop.time) {
         root.at("stop").fail("without an edge or a body that moves the run ends by time alone: give time");
     }
+    if (scene.stop.crack_length && scene.cracks.empty()) {
+        root.at("stop").at("crack_length").fail("there is no crack");
+    }
     if (const auto output = root.find("output")) {
         scene.output = read_output(*output);
     }

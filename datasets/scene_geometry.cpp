@@ -77,6 +77,7 @@ bool crosses_itself(const std::vector<Vec2>& points, bool closed) {
 }
 
 bool meets_rectangle(const std::vector<Vec2>& line, const Vec2& size) {
+    constexpr double rounding = 1e-9;  // of the size
     // Each segment is a + s (b - a), 0 <= s <= 1; the rectangle's four sides cut that stretch of s down (Liang and
     // Barsky 1984).
     for (std::size_t i = 0; i + 1 < line.size(); ++i) {
@@ -86,7 +87,8 @@ bool meets_rectangle(const std::vector<Vec2>& line, const Vec2& size) {
         double last = 1;
         for (int axis = 0; axis < 2; ++axis) {
             if (along[axis] == 0) {
-                last = a[axis] >= 0 && a[axis] <= size[axis] ? last : -1;
+                const double margin = rounding * size[axis];
+                last = a[axis] > margin && a[axis] < size[axis] - margin ? last : -1;
                 continue;
             }
             const double low = (0 - a[axis]) / along[axis];
@@ -94,7 +96,7 @@ bool meets_rectangle(const std::vector<Vec2>& line, const Vec2& size) {
             first = std::max(first, std::min(low, high));
             last = std::min(last, std::max(low, high));
         }
-        if (first <= last) {
+        if (first < last) {
             return true;
         }
     }

@@ -16,7 +16,7 @@ std::size_t repeated_point(const std::vector<Vec2>& points, bool closed);
 /// Whether a line or polygon touches, crosses or doubles back on itself.
 bool crosses_itself(const std::vector<Vec2>& points, bool closed);
 
-/// Whether any part of a line lies in the rectangle from the origin to `size`, its border included.
+/// Whether any part of a line lies in the rectangle from the origin to `size`; not what only runs along its border.
 bool meets_rectangle(const std::vector<Vec2>& line, const Vec2& size);
 
 }  // namespace crampfit

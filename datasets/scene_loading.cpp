@@ -135,7 +135,7 @@ std::vector<Vec2> read_crack_points(const Entry& entry, const Vec2& specimen_siz
         entry.fail("a crack must not cross or touch itself");
     }
     if (!meets_rectangle(points, specimen_size)) {
-        entry.fail("the crack lies outside the specimen");
+        entry.fail("the crack lies outside the specimen, or only along its sides");
     }
     return points;
 }

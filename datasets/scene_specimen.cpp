@@ -44,6 +44,23 @@ Polygon read_polygon(const Entry& entry) {
     return polygon;
 }
 
+/// Whether a shape's bounding box lies beside the rectangle from the origin to `size`.
+bool lies_beside(const Shape& shape, const Vec2& size) {
+    Vec2 low, high;
+    if (const auto* circle = std::get_if<Circle>(&shape)) {
+        low = circle->centre - Vec2::Constant(circle->radius);
+        high = circle->centre + Vec2::Constant(circle->radius);
+    } else {
+        const std::vector<Vec2>& points = std::get<Polygon>(shape).points;
+        low = high = points.front();
+        for (const Vec2& point : points) {
+            low = low.cwiseMin(point);
+            high = high.cwiseMax(point);
+        }
+    }
+    return (high.array() <= 0).any() || (low.array() >= size.array()).any();
+}
+
 Circle read_circle(const Entry& entry) {
     entry.only({"centre", "radius"});
     return {entry.at("centre").point(), entry.at("radius").number(limits::radius)};
@@ -265,6 +282,9 @@ SpecimenPlan read_specimen_plan(const Entry& specimen, const Materials& material
         for (const Entry& cutout : cutouts->list()) {
             cutout.only({"polygon", "circle"});
             plan.cutouts.push_back(read_shape(cutout));
+            if (lies_beside(plan.cutouts.back(), plan.size)) {
+                cutout.fail("lies beside the specimen: nothing would be cut out");
+            }
         }
     }
     if (const auto parts = specimen.find("parts")) {

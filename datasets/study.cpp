@@ -154,6 +154,11 @@ void read_models(const Entry& entry, const Overrides& scene_overrides, Study& st
         entry.fail("only a study of experiments can compare models");
     }
     study.compared_key = entry.at("key").text();
+    for (const Parameter& parameter : study.parameters) {
+        if (std::ranges::count(parameter.keys, study.compared_key) > 0) {
+            entry.at("key").fail(fmt::format("belongs to the parameter \"{}\" already", parameter.name));
+        }
+    }
     for (const Entry& value : entry.at("values").list()) {
         ModelChoice& model = study.models.emplace_back();
         model.name = value.text();

@@ -54,6 +54,9 @@ std::vector<NumberRule> read_keys(const Entry& entry, const Study& study, Parame
             key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}", describe(rules.back().dimension),
                                  describe(rules.front().dimension)));
         }
+        if (std::ranges::count(parameter.keys, key.text()) > 0) {
+            key.fail("is given twice");
+        }
         parameter.keys.push_back(key.text());
     }
     return rules;
@@ -89,13 +92,14 @@ double read_value(const Entry& entry, const std::vector<NumberRule>& rules, cons
     return value;
 }
 
-std::optional<Prior> read_prior(const Entry& parameter, const Dimension& dimension) {
-    const auto entry = parameter.find("prior");
-    if (!entry) {
+std::optional<Prior> read_prior(const Entry& entry, const std::vector<NumberRule>& rules, const Parameter& parameter) {
+    const auto prior = entry.find("prior");
+    if (!prior) {
         return std::nullopt;
     }
-    entry->only({"mean", "sd"});
-    return Prior{entry->at("mean").number(limits::finite(dimension)), entry->at("sd").number(limits::positive(dimension))};
+    prior->only({"mean", "sd"});
+    return Prior{read_value(prior->at("mean"), rules, parameter),
+                 prior->at("sd").number(limits::positive(rules.front().dimension))};
 }
 
 Parameter read_parameter(const Entry& entry, const Study& study) {
@@ -130,7 +134,7 @@ Parameter read_parameter(const Entry& entry, const Study& study) {
             entry.at("lower").fail("must be greater than 0 on a log scale");
         }
     }
-    parameter.prior = read_prior(entry, rules.front().dimension);
+    parameter.prior = read_prior(entry, rules, parameter);
     return parameter;
 }
 

@@ -216,12 +216,18 @@ WoodArea::Sample MaterialMap::in_rings(const Vec2& x) const {
     return {0};
 }
 
+// From the picture's lower left corner, to the right and up.
+Vec2 MaterialMap::in_pixels(const Vec2& x) const {
+    const Vec2 arm = x - picture_offset_;
+    return Vec2(picture_cos_ * arm.x() + picture_sin_ * arm.y(), -picture_sin_ * arm.x() + picture_cos_ * arm.y()) /
+           scene_.specimen.map->pixel;
+}
+
 std::size_t MaterialMap::pixel_at(const Vec2& x) const {
     const Specimen& map = *scene_.specimen.map;
-    const Vec2 arm = x - picture_offset_;
-    const Vec2 in_picture(picture_cos_ * arm.x() + picture_sin_ * arm.y(), -picture_sin_ * arm.x() + picture_cos_ * arm.y());
-    const int column = std::clamp(static_cast<int>(std::floor(in_picture.x() / map.pixel)), 0, map.columns - 1);
-    const int up = std::clamp(static_cast<int>(std::floor(in_picture.y() / map.pixel)), 0, map.rows - 1);
+    const Vec2 place = in_pixels(x);
+    const int column = std::clamp(static_cast<int>(std::floor(place.x())), 0, map.columns - 1);
+    const int up = std::clamp(static_cast<int>(std::floor(place.y())), 0, map.rows - 1);
     return static_cast<std::size_t>(map.rows - 1 - up) * map.columns + column;
 }
 
@@ -254,6 +260,13 @@ LocalWood MaterialMap::wood_of(const WoodArea::Sample& sample) const {
 
 bool MaterialMap::has_wood_at(const Vec2& x) const {
     return !scene_.specimen.map || scene_.specimen.map->label[pixel_at(x + corner_)] != Specimen::void_label;
+}
+
+bool MaterialMap::is_seen(const Vec2& x) const {
+    if (!scene_.specimen.map) return true;
+    constexpr double rounding = 1.0;  // of the picture's edge, in pixels
+    const Vec2 place = in_pixels(x + corner_), size(scene_.specimen.map->columns, scene_.specimen.map->rows);
+    return (place.array() >= -rounding).all() && (place.array() <= size.array() + rounding).all();
 }
 
 // The wood of a rectangle that lies within one band of the rings; null where it may hold others.

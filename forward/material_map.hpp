@@ -63,6 +63,9 @@ class MaterialMap {
     /// Whether there is any at a place.
     bool has_wood_at(const Vec2& x) const;
 
+    /// Whether a picture or a specimen's file says what is at a place; everywhere where there is none.
+    bool is_seen(const Vec2& x) const;
+
     /// Averaged over an upright rectangle: elasticity as layers across the direction in which the wood changes most, the rest by
     /// area.
     LocalWood average(WoodArea& area) const;
@@ -102,6 +105,7 @@ class MaterialMap {
                             LayeredElasticity& mean) const;
     const LocalWood* band_around(const Vec2& centre, const Vec2& half) const;
     WoodArea::Sample in_rings(const Vec2& x) const;
+    Vec2 in_pixels(const Vec2& x) const;
     std::size_t pixel_at(const Vec2& x) const;
     WoodArea::Sample in_picture(const Vec2& x) const;
 

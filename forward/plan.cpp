@@ -211,6 +211,26 @@ double farthest_motion(const Scene& scene, double end) {
     return farthest;
 }
 
+// Whether some stop condition is met in the end, whatever the wood does.
+bool may_end(const Scene& scene) {
+    if (scene.stop.time) return true;
+    const auto gets_there = [&](const auto& driver) {
+        if (driver.name != scene.measure.displacement || !scene.stop.displacement) return false;
+        const double way = driver.until ? speed_of(driver) * *driver.until : std::numeric_limits<double>::infinity();
+        return speed_of(driver) > 0.0 && way >= *scene.stop.displacement * (1.0 - 1e-9);
+    };
+    const auto is_pulled = [&](const Edge& edge) {
+        return edge.traction && edge.name == scene.measure.displacement && scene.stop.displacement;
+    };
+    const auto follows = [&](const Body& body) {
+        return (body.free[0] || body.free[1]) && body.name == scene.measure.displacement && scene.stop.displacement;
+    };
+    const bool grows = std::ranges::any_of(scene.cracks, [](const Crack& crack) { return crack.grows != Growth::none; });
+    return (grows && scene.stop.crack_length) || std::ranges::any_of(scene.edges, gets_there) ||
+           std::ranges::any_of(scene.bodies, gets_there) || std::ranges::any_of(scene.edges, is_pulled) ||
+           std::ranges::any_of(scene.bodies, follows);
+}
+
 // How far the edges of a strip go until a long crack runs through it, G = E eps^2 h (REFERENCES: strip) with the toughest wood's
 // toughness and the softest wood's stiffness, and half as far again for arrests.
 double splitting_motion(const Scene& scene, const Discretisation& body) {
@@ -298,6 +318,19 @@ void choose_history(const Scene& scene, Plan& plan, const MaterialMap& materials
                             "external work = strain + kinetic + fracture energy + what wood, damping and friction dissipate"});
 }
 
+// A picture that does not reach over the whole specimen.
+void choose_wood_unseen(const Scene& scene, Plan& plan, const MaterialMap& materials, const Discretisation& body) {
+    const auto& at = body.points.position;
+    const auto seen = static_cast<int>(std::count_if(at.begin(), at.end(), [&](const Vec2& x) { return materials.is_seen(x); }));
+    if (seen == body.points.count()) return;
+    if (seen == 0)
+        refuse(scene, scene.specimen.picture ? "specimen.image" : "specimen.file",
+               (scene.specimen.picture ? scene.specimen.picture->file : scene.specimen.file).string(),
+               "lies wholly beside the specimen: see pixel, offset and rotation");
+    plan.choices.push_back({"wood not seen", fmt::format("{:.2g} % of the specimen", 100.0 - 100.0 * seen / body.points.count()),
+                            "the picture does not reach there: taken for the wood of its nearest pixel"});
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -327,6 +360,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                        (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
                         !bridged && (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
+    if (!may_end(scene))
+        refuse(scene, "stop",
+               scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
+               "the run would never end: what is measured does not get there, and no time ends it");
     plan.remembers = materials.remembers();
     check_memory(scene, plan.quasistatic, materials, body);
     check_bridging(scene, plan.quasistatic, materials, body);
@@ -388,8 +425,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                    : "solver.extrapolate is false");
     if (plan.quasistatic && plan.grows && least_advance > 0.0 && least_advance < body.layout.cell.minCoeff() * (1.0 - 1e-6))
         choose("advance", "shorter than a cell",
-               "what is released over less than a cell goes in steps with the grid: the load comes out too high, by some 7 % for "
-               "half a cell and more for less; 0 takes G at the tip instead, or take finer cells");
+               "what is released over less than a cell goes in steps with the grid: the load comes out too high; 0 takes G at the "
+               "tip instead, or take finer cells");
     if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) &&
         least_advance > 0.0)
         choose("tips near sharp boundaries", "boxes with finer cells around them",
@@ -416,6 +453,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
            !materials.homogeneous()  ? "band widths do not round to points; J carries the material-gradient term"
            : materials.orthotropic() ? "one radial direction"
                                      : "no orientation");
+    choose_wood_unseen(scene, plan, materials, body);
     choose_history(scene, plan, materials, body);
 
     if (scene.cracks.empty()) choose("crack fields", "none", "no crack");

@@ -248,7 +248,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         if (close) {
             const Evaluation there = wide.get();
             if (there.usable() && uncertainty.slope.size() > 0) {
-                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty), goes_one_way(study));
+                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty));
             } else {
                 take_in_untold_grid(fit, box, best.x,
                                     there.usable() ? "no slopes at the best point" : "cells twice as wide: " + there.status);

@@ -30,6 +30,13 @@ double size_of(const Parameter& parameter, double value) {
     return parameter.scale == Scale::linear ? std::max(std::abs(value), 0.5 * (parameter.upper - parameter.lower)) : value;
 }
 
+// Data tell nothing of it.
+bool is_whole_box(const Parameter& parameter, const FittedParameter& fitted) {
+    const double rounding = 1e-9 * (parameter.upper - parameter.lower);
+    return fitted.lower_95 * parameter.unit_factor <= parameter.lower + rounding &&
+           fitted.upper_95 * parameter.unit_factor >= parameter.upper - rounding;
+}
+
 // A shift [SI] of a parameter from a value, as a part of it, or in its unit where the value may be near 0.
 std::string shift_text(const Parameter& parameter, double value, double shift) {
     return size_of(parameter, value) > std::abs(value)
@@ -67,7 +74,7 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorX
 
 }  // namespace
 
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
+GridShare left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
     const Eigen::VectorXd values = model.box().values(best.x);
     Evaluation here = *best.evaluation;
     const std::vector<FitResidual> before = model.residuals(here);
@@ -75,10 +82,13 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
     model.weigh(here, values);
     model.weigh(wide, values);
     const std::vector<FitResidual> after = model.residuals(here);
+    GridShare grid{.left = {}, .one_way = true};
     std::map<std::string, double> share;
     for (const Experiment& experiment : study.experiments) {
         // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
-        share[experiment.name] = has_two_grids(experiment) ? 0.75 : 1.0;
+        const bool two = has_two_grids(experiment);
+        share[experiment.name] = two ? 0.75 : 1.0;
+        grid.one_way = grid.one_way && two;
     }
     Eigen::VectorXd change = wide.residuals - here.residuals;
     Eigen::MatrixXd slope = about.slope;
@@ -87,18 +97,21 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
         slope.row(row) *= before[i].sigma / after[i].sigma;
         change[row] *= share.at(before[i].experiment);
     }
-    return least_squares(slope, change);
+    grid.left = least_squares(slope, change);
+    return grid;
 }
 
-bool goes_one_way(const Study& study) { return std::ranges::all_of(study.experiments, has_two_grids); }
-
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left, bool one_way) {
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const GridShare& grid) {
+    const auto& [left, one_way] = grid;
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
     bool is_near = true;
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        if (is_whole_box(parameter, fit.parameters[static_cast<std::size_t>(j)])) {
+            continue;
+        }
         is_near = is_near && std::abs(shifts[j]) <= farthest_told * size_of(parameter, values[j]);
         told.push_back(shift_text(parameter, values[j], shifts[j]));
     }

@@ -8,8 +8,12 @@
 
 namespace crampfit {
 
-/// How far the truth may lie from the best point because of the grid [parameters, of the unit cube]: anywhere up to this much.
-///
+/// What the grid leaves.
+struct GridShare {
+    Eigen::VectorXd left;  // how far the truth may lie from the best point [parameters, of the unit cube]: anywhere up to this much
+    bool one_way = false;  // on that side only: every scene has a second grid, so that errors of both go the same way
+};
+
 /// Cells twice as wide, each scene on that grid alone, change the residuals by g (`wide`, usable, with the best point's values),
 /// and a fit there would have its best point off this one by m = -(J^T J)^-1 J^T g. J and g are weighed as that fit would weigh
 /// them (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
@@ -20,15 +24,13 @@ namespace crampfit {
 /// one by four thirds of that difference: there three quarters of g count.
 ///
 /// `about` tells of the best point.
-Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
-
-/// Whether both grids' errors go the same way: every scene has a second grid.
-bool goes_one_way(const Study& study);
+GridShare left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
 
 /// Takes what the grid leaves into the fit: each interval goes on by it on its side or, unless it goes one way, on both, and
 /// covariance and standard errors count it as spread evenly up to there, squares about the best point. Where it goes beyond a
-/// tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told. The message says it.
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left, bool one_way);
+/// tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told. Of a parameter that
+/// the data do not tell, whose interval is its whole box, nothing is asked. The message says it.
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const GridShare& grid);
 
 /// Where what the grid leaves cannot be told, and why: all intervals go on by that tenth to either side, and errors spread evenly
 /// up to there count, each parameter's by itself.

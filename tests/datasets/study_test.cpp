@@ -167,14 +167,14 @@ TEST(UnitStudy, MachinesAndFixedRatios) {
 
 TEST(UnitStudy, ModelsToCompare) {
     const StudyFolder folder;
-    const Study study = folder.read(good_study + "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"30 MPa\", \"60 MPa\"]\n",
+    const Study study = folder.read(good_study + "[compare]\nkey = \"model.thickness\"\nvalues = [\"30 mm\", \"60 mm\"]\n",
                                     {{"materials.EW.density", "333 kg/m^3"}, {"optimizer.loss", "cauchy"}});
     EXPECT_EQ(study.optimizer.loss, Loss::cauchy);
-    EXPECT_EQ(study.compared_key, "materials.EW.E");
+    EXPECT_EQ(study.compared_key, "model.thickness");
     ASSERT_EQ(study.models.size(), 2u);
-    EXPECT_EQ(study.models[1].name, "60 MPa");
+    EXPECT_EQ(study.models[1].name, "60 mm");
     ASSERT_EQ(study.models[1].scenes.size(), 2u);
-    EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").youngs_modulus, 60e6);
+    EXPECT_DOUBLE_EQ(study.models[1].scenes[1].model.thickness, 60e-3);
     EXPECT_DOUBLE_EQ(study.models[1].scenes[1].materials.at("EW").density, 333);
 }
 
@@ -266,6 +266,8 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"scale = \"log\"", "scale = \"ln\"", "parameters.EW toughness.scale", "must be one of"},
         {"sd = \"30 J/m^2\"", "sd = \"0 J/m^2\"", "parameters.EW toughness.prior.sd", "greater than 0"},
         {"mean = \"100 J/m^2\", ", "", "parameters.EW toughness.prior.mean", "missing"},
+        {"mean = \"100 J/m^2\", ", "mean = \"-100 J/m^2\", ", "parameters.EW toughness.prior.mean", "greater than 0"},
+        {"\"materials.LW.E\"]", "\"materials.LW.E\", \"materials.EW.E\"]", "parameters.stiffness.keys.2", "given twice"},
         {"name = \"stiffness\"", "name = \"EW toughness\"", "parameters.EW toughness", "is taken"},
         {"key = \"materials.EW.nu\"", "key = \"materials.EW.E\"", "parameters.2.initial", "missing unit"},
         {"keys = [\"materials.EW.E\"", "keys = [\"materials.EW.toughness\"", "parameters.stiffness.keys.1", "one dimension"},
@@ -286,12 +288,14 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"title =", "outputs = [\"peak force\", \"peak force\"]\ntitle =", "outputs.1", "asked for twice"},
         {"title =", "scene = \"wedge.toml\"\ntitle =", "scene", "either a scene or experiments"},
         {"[optimizer]", "[optimizer]\nloss = \"huper\"", "optimizer.loss", "did you mean \"huber\"?"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\"]\n[optimizer]", "compare.values",
+        {"[optimizer]", "[compare]\nkey = \"model.thickness\"\nvalues = [\"1 mm\"]\n[optimizer]", "compare.values",
          "at least two"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 mm\"]\n[optimizer]", "compare.values.1",
+        {"[optimizer]", "[compare]\nkey = \"model.thickness\"\nvalues = [\"1 mm\", \"1 MPa\"]\n[optimizer]", "compare.values.1",
          "wrong dimension"},
-        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"1 MPa\"]\n[optimizer]", "compare.values.1",
+        {"[optimizer]", "[compare]\nkey = \"model.thickness\"\nvalues = [\"1 mm\", \"1 mm\"]\n[optimizer]", "compare.values.1",
          "given twice"},
+        {"[optimizer]", "[compare]\nkey = \"materials.EW.E\"\nvalues = [\"1 MPa\", \"2 MPa\"]\n[optimizer]", "compare.key",
+         "belongs to the parameter \"stiffness\" already"},
         {"[optimizer]", "[compare]\nvalues = [\"1 MPa\", \"2 MPa\"]\n[optimizer]", "compare.key", "missing"},
         {"weight = 2.0", "compliance = \"0.1 mm\"", "experiments.wedge 1.compliance", "wrong dimension"},
         {"weight = 2.0", "compliance = \"-1 um/N\"", "experiments.wedge 1.compliance", "not be negative"},

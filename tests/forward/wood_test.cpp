@@ -1,4 +1,5 @@
 // Shape functions, wood by place, and the grid's layout.
+#include "datasets/error.hpp"
 #include "forward/transition_wood.hpp"
 #include "tests/forward/scenes.hpp"
 
@@ -213,6 +214,27 @@ TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
     std::printf("normal of an edge in a picture, cells of 8 pixels: within %.2f degrees, %.2f on average\n", worst, sum / count);
     EXPECT_LT(worst, least_told);
     EXPECT_LT(sum / count, 1.0);  // as asked of orientations
+}
+
+// Of 1 mm x 1 mm the picture covers nine tenths, all, nothing.
+TEST(UnitWood, APictureBesideTheSpecimenIsToldOf) {
+    Scene scene = two_woods(20, [](const Vec2& x) { return x.x() > 0.5e-3; });
+    scene.edges = {{"top", Side::top, {}, {0.0, 1e-6}, {}, {}}, {"bottom", Side::bottom, {}, {0.0, 0.0}, {}, {}}};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 1e-6;
+    const auto told = [&](double offset) {
+        scene.specimen.file_offset = {offset, 0.0};
+        const MaterialMap materials(scene);
+        const Discretisation body(scene, materials);
+        std::string text;
+        for (const Plan::Choice& choice : make_plan(scene, materials, body).choices)
+            if (choice.part == "wood not seen") text = choice.choice;
+        return text;
+    };
+    EXPECT_EQ(told(0.0), "");
+    EXPECT_EQ(told(0.04e-3), "");  // less than a pixel: rounding
+    EXPECT_EQ(told(0.15e-3), "10 % of the specimen");
+    EXPECT_THROW(told(1.2e-3), InputError);
 }
 
 // The map's transition wood comes from a table: against the laws themselves, moduli 1000 apart.

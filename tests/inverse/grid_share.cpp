@@ -53,7 +53,7 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
         for (Eigen::Index i = 0; i < change.size(); ++i) {
             wide.modelled[i] += stations[static_cast<std::size_t>(i)].sigma * change[i];
         }
-        const Eigen::VectorXd left = left_by_grid(study, model, best, wide, about);
+        const Eigen::VectorXd left = left_by_grid(study, model, best, wide, about).left;
         const double share = extrapolates ? 0.75 : 1.0;
         std::printf("left %.6f %.6f of %.6f %.6f\n", left[0], left[1], off[0], off[1]);
         EXPECT_NEAR(left[0], share * off[0], 1e-8);
@@ -74,7 +74,7 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
                                   .upper_95 = box.value(j, x[j] + 0.1)});
     }
     fit.covariance = Eigen::Vector2d(4, 9).asDiagonal();
-    take_in_grid(fit, box, x, left, true);
+    take_in_grid(fit, box, x, {left, true});
     EXPECT_DOUBLE_EQ(fit.parameters[0].lower_95, box.value(0, 0.4));
     EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.61), 1e-9);
     EXPECT_NEAR(fit.parameters[1].lower_95, box.value(1, 0.28), 1e-9);
@@ -89,7 +89,7 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
     // By more than a tenth of a value: no slope tells that, and a tenth to either side is the least. d/3 for each as above.
     const Fit before = fit;
-    take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06), true);
+    take_in_grid(fit, box, x, {Eigen::Vector2d(0.01, -0.06), true});
     for (int j = 0; j < 2; ++j) {
         const double tenth = 0.1 * box.value(j, x[j]), share = tenth / box.slope(j, x[j]);
         const FittedParameter &was = before.parameters[j], &is = fit.parameters[j];
@@ -99,6 +99,14 @@ TEST(UnitGridShare, MovesOneEndOfAnIntervalAndWidensTheCovariance) {
     }
     EXPECT_DOUBLE_EQ(fit.covariance(0, 1), before.covariance(0, 1));
     EXPECT_NE(fit.message.find("cannot be told"), std::string::npos);
+    // Of one that data tell nothing of no shift is asked: the other's interval goes on by its own.
+    fit = before;
+    fit.parameters[1].lower_95 = box.value(1, 0);
+    fit.parameters[1].upper_95 = box.value(1, 1);
+    take_in_grid(fit, box, x, {Eigen::Vector2d(0.01, -0.06), true});
+    EXPECT_NEAR(fit.parameters[0].upper_95, box.value(0, 0.62), 1e-9);
+    EXPECT_DOUBLE_EQ(fit.parameters[0].lower_95, before.parameters[0].lower_95);
+    EXPECT_EQ(fit.message.find("cannot be told"), std::string::npos);
 }
 
 // A slack of 0 in a box of 100 um: a shift of 4 um is small beside half of that, one of 6 um is not; neither is a part of 0.
@@ -114,7 +122,7 @@ TEST(UnitGridShare, TellsShiftsOfParametersNearZeroInTheirUnit) {
         Fit fit;
         fit.parameters.push_back({.name = "slack", .key = "", .value = 0, .unit = "um", .lower_95 = -1, .upper_95 = 1});
         fit.covariance = Eigen::MatrixXd::Identity(1, 1);
-        take_in_grid(fit, box, Eigen::VectorXd::Constant(1, 0.5), Eigen::VectorXd::Constant(1, shift / 100e-6), false);
+        take_in_grid(fit, box, Eigen::VectorXd::Constant(1, 0.5), {Eigen::VectorXd::Constant(1, shift / 100e-6), false});
         return fit;
     };
     const Fit told = fit_after(4e-6), untold = fit_after(6e-6);

@@ -226,6 +226,9 @@ TEST(UnitResume, RunsOfAnotherStudyAndOtherFilesAreRefused) {
     folder.write("fit.runs", std::string(1000, 'x'));
     EXPECT_THROW(fit_study(study, options), InputError);
     EXPECT_EQ(folder.read("fit.runs").size(), 1000u);
+    folder.write("fit.runs", "notes");  // as short as a head that a kill has torn
+    EXPECT_THROW(fit_study(study, options), InputError);
+    EXPECT_EQ(folder.read("fit.runs"), "notes");
 }
 
 TEST(SystemResume, ASensitivityStudyGoesOn) {
