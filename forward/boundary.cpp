@@ -12,9 +12,6 @@ namespace {
 // The ends of a stretch that is shorter are not seen on their own.
 constexpr double least_cells_between_ends = 4.0;
 
-// What is hardly free is held as if it were so far, for the condition of the stiffness.
-constexpr double least_freed = 0.02;
-
 bool on_side(const Layout& layout, Side side, const Vec2& x) {
     const Vec2 near = 1e-6 * layout.cell;
     switch (side) {
@@ -132,14 +129,15 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     const std::vector<double> mass = field_masses(body_, cracks.fields());
     std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
     const auto hold = [&](int node, int axis, int driver) {  // where two meet, the first in the list holds
-        if (taken[node][axis]) return;
+        if (taken[node][axis]) return false;
         taken[node][axis] = true;
         held.push_back({node, axis, driver});
+        return true;
     };
     for (int e = 0; e < edges_; ++e) {
         const Edge& edge = scene_.edges[e];
         if (edge.traction) continue;
-        int found = 0;
+        int found = 0, holds = 0;
         std::array<std::vector<CrackTip>, 2> ends;
         for (const int axis : {0, 1})
             if (materials && edge.velocity[axis]) ends[axis] = ends_within(edge, axis, cracks, mass);
@@ -155,19 +153,24 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
                     const double here = share_freed(x, end, layout);
                     if (here > 0.0 && here < 1.0) {
                         near = &end;
-                        freed = std::max(here, least_freed);
+                        freed = std::max(here, least_freed_at_rest);
                     }
                 }
                 if (near) {
+                    ++holds;
                     const double modulus = opening_modulus(*materials, x, 0.5 * layout.cell, near->direction);
                     // Half a pair gives half as much.
                     tied.push_back(
                         {n, axis, e, 2.0 * tie_stiffness(freed, modulus * layout.thickness), modulus, x, near->direction});
                 } else if (in_range(layout, edge, x)) {
-                    hold(n, axis, e);
+                    holds += hold(n, axis, e);
                 }
             }
         }
+        const bool prescribes = edge.velocity[0] || edge.velocity[1];
+        if (found > 0 && holds == 0 && prescribes)
+            throw InputError(scene_.file.string(), "edges." + edge.name, "velocity",
+                             "edges before it hold all that it would hold: give each its own range");
         if (found == 0)
             throw InputError(scene_.file.string(), "edges." + edge.name, "range",
                              "no node of the grid lies on this stretch of the side");

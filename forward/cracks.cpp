@@ -36,6 +36,32 @@ constexpr double reach_of_an_end = 1.5;
 // Masks are kept in eight bits.
 constexpr int most_cracks = 8;
 
+// Slopes to the grid, in cells, up to which a tip frees pairs by columns alone and from which on by places alone.
+constexpr double slope_of_columns = 0.5;
+constexpr double slope_of_places = 0.7;
+
+// How a tip that goes so passes nodes: by columns, or by rows if it goes through more of these, and by places along its way.
+struct Passing {
+    Passing(const Vec2& direction, const Vec2& cell) {
+        const Vec2 in_cells = direction.cwiseQuotient(cell).cwiseAbs();
+        axis = in_cells.x() >= in_cells.y() ? 0 : 1;
+        const double slope = in_cells[1 - axis] / in_cells[axis];
+        by_columns = std::clamp((slope_of_places - slope) / (slope_of_places - slope_of_columns), 0.0, 1.0);
+        way = std::lerp(direction.cwiseProduct(cell).lpNorm<1>(), 1.0 / in_cells[axis], by_columns);
+    }
+
+    double ahead(const Vec2& arm, const Vec2& direction) const {
+        return std::lerp(arm.dot(direction), arm[axis] / direction[axis], by_columns);
+    }
+
+    int axis;
+    double by_columns;  // share of that law
+    double way;         // on which a pair is freed [m]
+};
+
+// Share freed of what no tip comes to, below any share from which on a pair is there.
+constexpr double not_begun = -1.0;
+
 double length_inside(const std::vector<Vec2>& points, const Box& box) {
     double length = 0.0;
     for (std::size_t k = 0; k + 1 < points.size(); ++k) {
@@ -59,12 +85,12 @@ bool lies_beyond(double distance, const Vec2& from, const Vec2& to, const Vec2& 
 }  // namespace
 
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) {
-    // By the node's place along the crack, whatever its distance from it: the way into a corner of the support is short,
-    // and would free the nodes far off an oblique crack too early.
-    const Vec2 cell_along = tip.direction.cwiseProduct(layout.cell);
-    const double ahead = (node - tip.position).dot(tip.direction) + tip_lag(layout) * cell_along.norm();
-    return 0.5 - ahead / cell_along.lpNorm<1>();
+    const Passing passing(tip.direction, layout.cell);
+    const double lag = tip_lag(layout) * tip.direction.cwiseProduct(layout.cell).norm();
+    return 0.5 - (passing.ahead(node - tip.position, tip.direction) + lag) / passing.way;
 }
+
+double way_past_a_node(const Vec2& direction, const Vec2& cell) { return Passing(direction, cell).way; }
 
 double tie_stiffness(double freed, double stiffness) { return (1.0 - freed) / freed * stiffness / pair_compliance; }
 
@@ -262,11 +288,12 @@ double CrackFields::freed(int crack, int node) const {
     const Box support = body_->layout.support(node);
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
-        if (!exit_distance(tip->position, tip->direction, support)) continue;
+        if (!exit_distance(tip->position, tip->direction, support) && !exit_distance(tip->position, -tip->direction, support))
+            continue;
         if (!tip->inside) {  // on another crack the cut ends, and where a hole does: what lies behind it is whole
             const double ahead = (x - tip->position).dot(tip->direction);
             const double reach = reach_of_an_end * tip->direction.cwiseProduct(body_->layout.cell).norm();
-            if (ahead > reach && (tip->wall >= 0 || wood_lies_ahead(*tip, ahead + reach))) return 0.0;
+            if (ahead > reach && (tip->wall >= 0 || wood_lies_ahead(*tip, ahead + reach))) return not_begun;
             continue;
         }
         least = std::min(least, share_freed(x, *tip, body_->layout));

@@ -52,8 +52,18 @@ struct FieldPair {
     double tie;            // stiffness that still holds the pair together [N/m]; 0 once the pair is free
 };
 
-/// Share of its way past a node, over the width of a cell, that a tip has gone: below 0 before, above 1 after.
+/// Share of its way past a node that a tip has gone: below 0 before, above 1 after. Along the grid, and at up to 27 degrees to
+/// it, a tip passes all nodes of a column of the grid, or of a row, in half a cell before and behind the place where it crosses
+/// it. So one column follows another, and as much energy is given up on all of the way. At 35 to 55 degrees, where it goes through
+/// as many rows as columns, nodes are passed by their places along the crack. In between the two go over into one another.
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout);
+
+/// The length of that way [m].
+double way_past_a_node(const Vec2& direction, const Vec2& cell);
+
+/// At equilibrium a pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than
+/// the wood: with less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
+inline constexpr double least_freed_at_rest = 0.02;
 
 /// What still holds the pair of fields at a node together when so much of it is freed [N/m]; `stiffness`: E' of the wood times
 /// the thickness [N/m].

@@ -12,10 +12,6 @@ namespace crampfit {
 
 namespace {
 
-// A pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than the wood: with
-// less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
-constexpr double least_freed = 0.02;
-
 // Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
 constexpr double face_stiffness_factor = 100.0;
 
@@ -49,7 +45,7 @@ constexpr double least_strain = 1e-5;
 }  // namespace
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
-    : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed),
+    : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed_at_rest),
       boundary_(scene, body, cracks_, &materials), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
       internal_force_(body, materials, plan.rotates, history_.get()), factor_(body.layout.cells_x, body.layout.cells_y, threads) {
@@ -303,6 +299,43 @@ void Equilibrium::mark_changes(bool geometric, double slack) {
         });
 }
 
+// Where the last tangent cannot be solved for as a piece between cracks hangs by a hinge, a ligament that no longer resists
+// bending: holds what moves most of it, which feels no force. Not where most of the specimen moves: that is held too little.
+bool Equilibrium::hold_hinge() {
+    constexpr int iterations = 3;
+    constexpr double moves = 1e-3, most_mass = 0.5;  // of the largest motion; of the specimen
+    if (!sliding_.empty() || cracks_.lines.empty() || equations_ == 0 || !(factor_.reciprocal_condition() > 0.0)) return false;
+    Eigen::MatrixXd mode(equations_, 1);  // by inverse iteration from loads that no mode is without
+    for (int e = 0; e < equations_; ++e) mode(e, 0) = 1.0 + std::sin(1.0 + e);
+    for (int k = 0; k < iterations; ++k) {
+        factor_.solve(mode);
+        const double largest = mode.cwiseAbs().maxCoeff();
+        if (!(largest > 0.0 && largest < INFINITY)) return false;
+        mode /= largest;
+    }
+    double moved = 0.0, all = 0.0;
+    int best = -1;
+    for (int dof = 0; dof < static_cast<int>(equation_.size()); ++dof) {
+        all += mass_[dof / 2];
+        if (equation_[dof] < 0) continue;
+        const double here = std::abs(mode(equation_[dof], 0));
+        if (here > moves) moved += mass_[dof / 2];
+        if (here == 1.0) best = dof;
+    }
+    if (best < 0 || moved > most_mass * all) return false;
+    pieces_.holds.push_back(best);
+    renumber();
+    factor_.mark_all();
+    find_forces();
+    return true;
+}
+
+// Whether all that is held beside the boundary, so that pieces do not move as a whole, feels no force.
+bool Equilibrium::pieces_are_at_rest(double scale) const {
+    constexpr double nothing = 1e-5;
+    return std::ranges::all_of(pieces_.holds, [&](int dof) { return std::abs(force_[dof / 2][dof % 2]) <= nothing * scale; });
+}
+
 // The tangent where it stands; with `slack`, of gradients that differ from these by so much at most.
 bool Equilibrium::factor_tangent(bool geometric, double slack) {
     mark_changes(geometric, slack);
@@ -413,7 +446,13 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     double slack = plan_.grows ? slack_of_tangent : 0.0;
     // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
     const auto factor = [&] {
-        return (slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0);
+        constexpr int most_hinges = 4;
+        for (int hinges = 0; hinges <= most_hinges; ++hinges) {
+            if ((slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0))
+                return true;
+            if (!hold_hinge()) return false;
+        }
+        return false;
     };
     find_forces();
     double residual = largest_residual();
@@ -445,6 +484,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
         if (residual <= balance * scale) {
+            if (!pieces_are_at_rest(scale)) return Outcome::mechanism;
             settle();
             return Outcome::solved;
         }
@@ -492,7 +532,7 @@ double Equilibrium::measured_displacement(double time) const {
 double Equilibrium::power() const {
     double power = 0.0;
     for (int driver = 0; driver < boundary_.drivers(); ++driver)
-        if (time_ < boundary_.travel_time(driver)) power += reaction_[driver].dot(boundary_.velocity_of(driver));
+        if (time_ <= boundary_.travel_time(driver)) power += reaction_[driver].dot(boundary_.velocity_of(driver));
     return power;
 }
 

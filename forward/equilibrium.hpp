@@ -135,6 +135,8 @@ class Equilibrium {
     void mark_changes(bool geometric, double slack);
     void find_forces();
     bool factor_tangent(bool geometric, double slack = 0.0);
+    bool hold_hinge();
+    bool pieces_are_at_rest(double scale) const;
     GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
     void couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void couple_points(bool geometric);

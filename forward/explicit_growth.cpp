@@ -46,13 +46,13 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
     state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
 
-    TipTies::Advance next{0.0, 0.0};
+    const double since = (0.5 + lag()) * plan_.time_step, until = (0.5 - lag()) * plan_.time_step;
+    double way = 0.0;
     if (ties_.holds(cracks_, crack, at_end))
-        next = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed,
-                                  displacement_, velocity_, plan_.time_step);
+        way = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed,
+                                 displacement_, velocity_, since, until);
     else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides, at no cost
-        next.way = std::min(state.allowed, leg_in_cells * cell);
-    const double way = next.way;
+        way = std::min(state.allowed, leg_in_cells * cell);
     if (way < least_way_in_cells * cell) return;
 
     Vec2 direction = tip.direction;
@@ -71,7 +71,8 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     state.since_patch += way;
     state.allowed -= way;
     note_speed(state, way);
-    books_.fracture += next.taken;
+    // As the ties have it: a tip that turns frees pairs otherwise than the balance has seen.
+    books_.fracture += ties_.energy(cracks_, displacement_, velocity_, since, until);
     if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
         ties_.take_in(cracks_, mass_, displacement_, false);
     } else {
@@ -79,6 +80,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
             materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
+    books_.fracture -= ties_.energy(cracks_, displacement_, velocity_, since, until);
     if (bridges_) bridges_->take_in(cracks_, mass_);
 }
 

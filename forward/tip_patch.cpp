@@ -41,7 +41,7 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> strains(const CellWeights& w, int nodes
 TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end,
                    double advance, double slack) {
     const CrackTip tip = cracks.lines[crack].tip(at_end);
-    cell_ = tip.direction.cwiseProduct(body.layout.cell).lpNorm<1>();
+    cell_ = way_past_a_node(tip.direction, body.layout.cell);
     // The crack as it will be, as far as that is wood.
     const double h = body.layout.cell.maxCoeff();
     double way = advance + slack;

@@ -21,7 +21,7 @@ double TipTies::share(const Tie& tie, double freed) const {
 double TipTies::stiffness(const Tie& tie, double f) const { return (1.0 - f) / ((f + tie.slack) * tie.compliance); }
 
 // The way on which a tip frees a pair [m], as `CrackFields` has it.
-double TipTies::width(const CrackTip& tip) const { return tip.direction.cwiseProduct(cell_).lpNorm<1>(); }
+double TipTies::width(const CrackTip& tip) const { return way_past_a_node(tip.direction, cell_); }
 
 void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& displacement,
                       bool at_rest, double softness) {
@@ -84,13 +84,17 @@ void TipTies::pull(const CrackFields& cracks, const std::vector<Vec2>& displacem
     }
 }
 
-double TipTies::energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {
+double TipTies::energy(const CrackFields& cracks, const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
+                       double since, double until) const {
     double sum = 0.0;
     for (const std::size_t k : live_) {
+        const FieldPair& pair = cracks.pairs[k];
         const Tie& tie = ties_[k];
         if (tie.waits) continue;
-        const double f = share(tie, cracks.pairs[k].freed);
-        sum += 0.5 * stiffness(tie, f) * (jump_of(cracks.pairs[k], displacement) + tie.stretch).squaredNorm();
+        const double f = share(tie, pair.freed);
+        const Vec2 here = jump_of(pair, displacement) + tie.stretch;
+        const Vec2 rate = velocity.empty() ? Vec2(Vec2::Zero()) : jump_of(pair, velocity);
+        sum += 0.5 * stiffness(tie, f) * std::max(0.0, (here - since * rate).dot(here + until * rate));
         if (tie.slack > 0.0) sum -= 0.5 * (1.0 - f) * tie.stretch.squaredNorm() / (tie.slack * tie.compliance);
     }
     return sum;
@@ -107,9 +111,9 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
     return std::any_of(live_.begin(), live_.end(), [&](std::size_t k) { return is_of(cracks, cracks.pairs[k], crack, at_end); });
 }
 
-TipTies::Advance TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                                       const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
-                                       double dt) const {
+double TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
+                             const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double since,
+                             double until) const {
     const double width_here = width(cracks.lines[crack].tip(at_end));
     const auto taken_on = [&](double way) {  // [J]
         double sum = 0.0;
@@ -117,23 +121,24 @@ TipTies::Advance TipTies::balanced_way(const CrackFields& cracks, int crack, boo
             const FieldPair& pair = cracks.pairs[k];
             const Tie& tie = ties_[k];
             if (tie.waits || !is_of(cracks, pair, crack, at_end)) continue;
-            const Vec2 stretch = jump_of(pair, displacement) + tie.stretch;
-            const Vec2 before = stretch - dt * (velocity[pair.left] - velocity[pair.right]);
+            const Vec2 here = jump_of(pair, displacement) + tie.stretch;
+            const Vec2 rate = velocity[pair.left] - velocity[pair.right];
+            const Vec2 before = here - since * rate, next = here + until * rate;
             const double from = share(tie, pair.freed);
             const double to = share(tie, pair.freed + way / width_here);
-            sum += 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, stretch.dot(before));
+            sum += 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, next.dot(before));
             if (tie.slack > 0.0) sum -= 0.5 * (to - from) * tie.stretch.squaredNorm() / (tie.slack * tie.compliance);
         }
         return sum;
     };
     const auto asked_on = [&](double way) { return toughness * thickness_ * way; };
-    if (const double taken = taken_on(most); taken >= asked_on(most)) return {most, taken};
+    if (taken_on(most) >= asked_on(most)) return most;
     double low = 0.0, high = most;
     for (int k = 0; k < 20; ++k) {
         const double middle = 0.5 * (low + high);
         (taken_on(middle) > asked_on(middle) ? low : high) = middle;
     }
-    return {low, asked_on(low)};
+    return low;
 }
 
 }  // namespace crampfit

@@ -35,17 +35,20 @@ class TipTies {
     /// Adds the ties' forces to those of the fields [N].
     void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
 
-    double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const;  // [J]
+    double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {  // [J]
+        return energy(cracks, displacement, {}, 0.0, 0.0);
+    }
 
-    /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for. Over a step
-    /// of central differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch of this step
-    /// times that of the one before: a step `dt` [s] back, by the velocities.
-    struct Advance {
-        double way;    // [m]
-        double taken;  // what the ties give up on it [J]: more than the toughness asks for where `most` ends the way
-    };
-    Advance balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                         const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double dt) const;
+    /// Over a step of central differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch at
+    /// the next forces, `until` [s] ahead by the velocities, times that at the last, `since` [s] back: so counted.
+    double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
+                  double since, double until) const;
+
+    /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for: more than
+    /// that where `most` ends the way. Times as for the energy.
+    double balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
+                        const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double since,
+                        double until) const;
 
     /// Whether it is this tip that frees the pair.
     static bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end);
