@@ -12,8 +12,9 @@ namespace crampfit {
 
 namespace {
 
-constexpr int explicit_steps_between_searches = 50;
-constexpr double search_margin = 2.0;  // in cells; parts move by far less between two searches
+constexpr int most_steps_between_searches = 50;
+constexpr double search_margin = 2.0;          // in cells
+constexpr double least_part_of_margin = 0.25;  // that anything may go between two searches
 
 // Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets
 // the time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
@@ -142,7 +143,7 @@ void SlidingBody::find_holds() {
 }
 
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
-    steps_between_searches_ = explicit_steps_between_searches;
+    searches_each_step_ = false;
     const Points& points = body_.points;
     const int nodes = body_.layout.nodes_per_cell();
     // What a facet adds to the stiffness of a node, at most: its row of the facet's tangent, signs aside.
@@ -186,7 +187,16 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
     const Box at_rest{wide.low - reach, wide.high + reach};
     const std::vector<int> before = std::exchange(near_, {});
     bool torn_anew = false;
-    const bool some_only = steps_between_searches_ > 1;  // then friction has not followed the others
+    const bool some_only = !searches_each_step_;  // then friction has not followed the others
+    // As many steps to the next search as keep the way within the margin, going on as since the last.
+    const double way = (moved - searched_at_).norm() + std::abs(std::sqrt(farthest) - farthest_at_search_);
+    const double most = least_part_of_margin * margin.minCoeff();
+    steps_to_search_ =
+        std::min({2 * steps_since_search_ + 1, most_steps_between_searches,
+                  way > 0.0 ? std::max(1, static_cast<int>(steps_since_search_ * most / way)) : most_steps_between_searches});
+    steps_since_search_ = 0;
+    searched_at_ = moved;
+    farthest_at_search_ = std::sqrt(farthest);
     for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
         if (!at_rest.contains(body_.facets[i].position)) continue;
         const Vec2 x = current(i, displacement);
@@ -234,7 +244,7 @@ void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacemen
     grips_.clear();
     for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
     const auto keep = [&](int i) { place_[i] = current(i, displacement) - moved; };
-    if (steps_between_searches_ > 1) std::for_each(near_.begin(), near_.end(), keep);
+    if (!searches_each_step_) std::for_each(near_.begin(), near_.end(), keep);
     else
         for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
 }
@@ -325,7 +335,9 @@ void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement)
 }
 
 std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {
-    if (age_++ % steps_between_searches_ == 0) find_near(moved, displacement);
+    const double most = least_part_of_margin * search_margin * body_.layout.cell.minCoeff();
+    if (searches_each_step_ || ++steps_since_search_ >= steps_to_search_ || (moved - searched_at_).norm() > most)
+        find_near(moved, displacement);
     const double onset = onset_in_cells * body_.layout.cell.minCoeff();
     if (yield_) sink(moved, displacement);
     std::vector<Touch> found;

@@ -94,8 +94,11 @@ class SlidingBody {
     std::vector<int> first_hold_;    // [facets + 1]
     std::vector<double> stiffness_;  // [facets] [N/m]
     std::vector<int> near_;          // facets that the body may touch before the list is made anew
-    int age_ = 0;
-    int steps_between_searches_ = 1;
+    bool searches_each_step_ = true;
+    int steps_since_search_ = 0;
+    int steps_to_search_ = 1;
+    Vec2 searched_at_ = Vec2::Zero();  // where the body had moved to at the last search [m]
+    double farthest_at_search_ = 0.0;  // that anything of the specimen had gone then [m]
     double stored_energy_ = 0.0;
 
     // Of wood that yields by more than the grid:

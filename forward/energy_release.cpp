@@ -187,15 +187,27 @@ struct ReleaseRate {
 // Part of the wood's change that may go along the crack's way for that.
 constexpr double little_change = 0.1;
 
+// Of the wood about the tip: how fast it goes as a whole must not count.
+Vec2 mean_velocity(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal) {
+    Vec2 sum = Vec2::Zero();
+    double mass = 0.0;
+    for_points_in(body, tip, extension, [&](int p, const Vec2&, const Mat2&) {
+        sum += body.points.mass[p] * value_at(body, p, nodal.velocity);
+        mass += body.points.mass[p];
+    });
+    return mass > 0.0 ? Vec2(sum / mass) : sum;
+}
+
 ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal,
                                 bool rotates) {
     const Points& points = body.points;
+    const Vec2 as_a_whole = mean_velocity(body, tip, extension, nodal);
     double sum = 0.0;
     double change_along = 0.0, change = 0.0;  // explicit gradients of the energy [J/m]
     for_points_in(body, tip, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
         const Mat2 u_gradient = gradient_at(body, p, nodal.displacement);
         const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
-        const Vec2 v = value_at(body, p, nodal.velocity);
+        const Vec2 v = value_at(body, p, nodal.velocity) - as_a_whole;
         const Vec2 a = value_at(body, p, nodal.acceleration);
         const Mat2 v_gradient = gradient_at(body, p, nodal.velocity);
         const double density = points.density(p);

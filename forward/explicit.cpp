@@ -93,6 +93,7 @@ void ExplicitSolver::surface_forces() {
         reaction_[t.driver] += t.force;
         books_.work += plan_.time_step * t.force.dot(velocity);
     }
+    half_a_step_ago_ = books_;
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
         const Vec2 gone = boundary_.moved(driver, time_ + (0.5 - lag()) * plan_.time_step, displacement_);
@@ -131,6 +132,10 @@ void ExplicitSolver::carry_velocities() {
 // Without force: velocities that the points hand back may close faces again, though the points themselves do not.
 void ExplicitSolver::close_crack_faces(bool with_force) {
     const double dt = plan_.time_step;
+    // Where points carry what the nodes have been given, they tell what the change took; forces' work has been counted without
+    // it.
+    const bool by_points = with_force && mapping_.nodes_carry() && !cracks_.pairs.empty();
+    if (by_points) books_.damped += mapping_.kinetic_energy(velocity_, team_);
     face_force_.assign(cracks_.pairs.size(), Vec2::Zero());
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
@@ -152,8 +157,9 @@ void ExplicitSolver::close_crack_faces(bool with_force) {
             const double most = faces.coefficient * too_fast;
             change += std::clamp(-rate.dot(along), -most, most) * along;
         }
-        const Vec2 rate_before = rate - dt * (acceleration_[pair.left] - acceleration_[pair.right]);
-        books_.damped -= m_left * m_right / total * change.dot(0.5 * (rate_before + rate + change));
+        const Vec2 gained = dt * (acceleration_[pair.left] - acceleration_[pair.right]);  // by the other forces
+        const Vec2 twice_mean = by_points ? -gained : Vec2(2.0 * rate - gained + change);
+        books_.damped -= 0.5 * m_left * m_right / total * change.dot(twice_mean);
         face_force_[k] = m_left * m_right / total / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;
@@ -161,6 +167,7 @@ void ExplicitSolver::close_crack_faces(bool with_force) {
         acceleration_[pair.left] += m_right / total * change / dt;
         acceleration_[pair.right] -= m_left / total * change / dt;
     }
+    if (by_points) books_.damped -= mapping_.kinetic_energy(velocity_, team_);
 }
 
 void ExplicitSolver::prescribe_velocities() {
@@ -200,7 +207,12 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
 EnergyBooks ExplicitSolver::energies() const {
     // As of the last forces: half of the product of velocities before and after them with the strain energy is what a leapfrog
     // keeps (Hairer, Lubich and Wanner 2003), exactly so where forces are linear.
+    // Of what that step's forces did from half a step before to half a step behind, one half.
     EnergyBooks books = books_;
+    if (time_ > 0.0) {
+        books.work = 0.5 * (books_.work + half_a_step_ago_.work);
+        books.damped = 0.5 * (books_.damped + half_a_step_ago_.damped);
+    }
     const double since = time_ > 0.0 ? (0.5 + lag()) * plan_.time_step : 0.0;
     std::vector<Vec2> there = displacement_;
     for (std::size_t n = 0; n < there.size(); ++n) there[n] -= since * velocity_[n];

@@ -8,8 +8,9 @@ namespace crampfit {
 
 namespace {
 
-constexpr int steps_between_searches = 10;
-constexpr double search_margin = 1.0;     // in cells; parts move by far less between two searches
+constexpr int most_steps_between_searches = 10;
+constexpr double search_margin = 1.0;     // in cells
+constexpr double part_of_margin = 0.25;   // that anything may go between two searches
 constexpr int neighbours_looked_at = 12;  // each way along the outline from the facet that was nearest a step ago
 
 // Stiffness of a facet over that of one cell of its wood, where the time step allows it.
@@ -27,10 +28,34 @@ PartContact::PartContact(const Discretisation& body, const std::vector<double>& 
         segment.weight = {body.values_at(c, f.position - half), body.values_at(c, f.position + half)};
         segment.stiffness = 0.5 * stiffness_in_cells * body.points.stiffest(f.point) / h * f.length * body.layout.thickness;
         segment.part = body.points.part[f.point];
+        segment.at_search = f.position - half;
         segments_.push_back(segment);
     }
+    find_neighbours();
     box_.resize(1 + *std::max_element(body.points.part.begin(), body.points.part.end()));
     soften(mass, most_frequency_squared);
+}
+
+// The outline's facets lie one after the other but where it closes.
+void PartContact::find_neighbours() {
+    constexpr double touching = 1e-3;  // of a facet's length
+    const int count = static_cast<int>(segments_.size());
+    const auto end_of = [&](int i, int e) -> Vec2 {
+        const Facet& f = body_.facets[i];
+        return f.position + (e - 0.5) * f.length * left_of(f.normal);
+    };
+    const auto join = [&](int i, int e, int j) {
+        const double near = touching * std::min(body_.facets[i].length, body_.facets[j].length);
+        const bool joins = segments_[i].part == segments_[j].part && (end_of(i, e) - end_of(j, 1 - e)).norm() < near;
+        if (joins) segments_[i].next[e] = j;
+        return joins;
+    };
+    for (int i = 0; i < count; ++i)
+        for (const int e : {0, 1}) {
+            if ((i > 0 && join(i, e, i - 1)) || (i + 1 < count && join(i, e, i + 1))) continue;
+            for (int j = 0; j < count && segments_[i].next[e] < 0; ++j)
+                if (j != i) join(i, e, j);
+        }
 }
 
 // What the facets of a node add to its stiffness is bounded by the sum of their springs' shares. A spring joins two nodes, and
@@ -60,6 +85,16 @@ void PartContact::move(int facet, const std::vector<Vec2>& displacement) {
     segment.end = {f.position - half, f.position + half};
     for (std::size_t k = 0; k < node.size(); ++k)
         for (const int e : {0, 1}) segment.end[e] += segment.weight[e][k] * displacement[node[k]];
+}
+
+// Out of the wood at a place of a facet: its normal; at one of its ends the sum of both facets' normals there, which tells inside
+// from outside at corners too (Baerentzen and Aanaes 2005).
+Vec2 PartContact::outward(int facet, double along) const {
+    const auto normal = [&](int j) -> Vec2 { return -left_of((segments_[j].end[1] - segments_[j].end[0]).normalized()); };
+    Vec2 out = normal(facet);
+    for (const int e : {0, 1})
+        if (along == e && segments_[facet].next[e] >= 0) out += normal(segments_[facet].next[e]);
+    return out;
 }
 
 // Square of the distance from x to a facet [m^2], and where on it the nearest place is: 0 at its first end, 1 at its second.
@@ -122,8 +157,7 @@ void PartContact::touch(Candidate& candidate, std::vector<Vec2>& force) {
     const auto& [a, b] = other.end;
     const Vec2 out = a + along * (b - a) - x;
     const double depth = out.norm();
-    // The wood lies on the left of b - a.
-    if (depth == 0.0 || cross(b - a, x - a) <= 0.0) return;
+    if (depth == 0.0 || out.dot(outward(candidate.nearest, along)) <= 0.0) return;
     const Vec2 push = own.stiffness * out;
     const Facet& facet = body_.facets[candidate.facet];
     const auto own_node = body_.points.node[facet.point];
@@ -137,8 +171,16 @@ void PartContact::touch(Candidate& candidate, std::vector<Vec2>& force) {
 
 void PartContact::push(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
     stored_energy_ = 0.0;
-    if (age_++ % steps_between_searches == 0) {
-        for (int i = 0; i < static_cast<int>(segments_.size()); ++i) move(i, displacement);
+    if (++steps_since_search_ >= steps_to_search_) {
+        double way = 0.0;  // that any facet has gone since the last search [m]
+        for (int i = 0; i < static_cast<int>(segments_.size()); ++i) {
+            move(i, displacement);
+            way = std::max(way, (segments_[i].end[0] - segments_[i].at_search).norm());
+            segments_[i].at_search = segments_[i].end[0];
+        }
+        const double steps = part_of_margin * search_margin * body_.layout.cell.minCoeff() / way * steps_since_search_;
+        steps_to_search_ = static_cast<int>(std::clamp(steps, 1.0, double{most_steps_between_searches}));
+        steps_since_search_ = 0;
         find_candidates();
     } else {
         for (const int i : near_) move(i, displacement);

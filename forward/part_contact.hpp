@@ -28,12 +28,16 @@ class PartContact {
         std::array<Vec2, 2> end;                               // [m]
         double stiffness;                                      // force per depth of its middle [N/m]
         int part;
+        Vec2 at_search;                   // its first end at the last search [m]
+        std::array<int, 2> next{-1, -1};  // facets that go on from its ends; -1: none does
     };
     struct Candidate {
         int facet;
         int nearest;  // of another part's facets, as last seen
     };
 
+    void find_neighbours();
+    Vec2 outward(int facet, double along) const;
     void soften(const std::vector<double>& mass, double most_frequency_squared);
     void move(int facet, const std::vector<Vec2>& displacement);
     void find_candidates();
@@ -45,7 +49,8 @@ class PartContact {
     std::vector<Box> box_;           // [parts]
     std::vector<int> near_;          // facets in another part's box, or nearly
     std::vector<Candidate> candidates_;
-    int age_ = 0;
+    int steps_since_search_ = 0;
+    int steps_to_search_ = 1;
     double stored_energy_ = 0.0;
 };
 

@@ -60,12 +60,15 @@ Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& b
     at_end_ = tracked.at_end;
     record_.tracked_crack = std::max(crack_, 0);
 
-    evenly_ = std::isfinite(plan.end_time);
-    interval_ = evenly_ ? static_cast<long>(std::ceil(plan.end_time / plan.time_step / scene.output.samples)) : 16;
+    // Evenly where the end is known: a time may stand beside other ends only lest the run go on for ever.
+    const bool time_guards = plan.grows && scene.stop.time && plan.end_time == *scene.stop.time;
+    evenly_ = std::isfinite(plan.end_time) && !scene.stop.crack_length && !time_guards;
+    interval_ = evenly_ ? static_cast<long>(std::ceil(plan.end_time / plan.time_step / scene.output.samples)) : 1;
     interval_ = std::max(interval_, 1L);
     for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
     for (const Body& rigid : scene.bodies) record_.reactions.push_back({rigid.name, {}});
-    reaction_sum_.assign(record_.reactions.size(), Vec2::Zero());
+    for (HalfInterval& half : halves_) half.reactions.assign(record_.reactions.size(), Vec2::Zero());
+    since_last_row_.assign(record_.reactions.size(), Vec2::Zero());
     record_.cracks.resize(scene.cracks.size());
     record_.points = body.points.count();
     if (scene.output.frames > 0) {
@@ -77,14 +80,41 @@ Recorder::Recorder(const Scene& scene, const Plan& plan, const Discretisation& b
 
 void Recorder::add_step() {
     ++steps_;
-    ++reaction_count_;
-    for (std::size_t d = 0; d < reaction_sum_.size(); ++d) reaction_sum_[d] += solver_.reactions()[d];
+    HalfInterval& half = halves_[2 * (steps_ - (next_row_ - interval_)) > interval_];
+    ++half.count;
+    for (std::size_t d = 0; d < half.reactions.size(); ++d) half.reactions[d] += solver_.reactions()[d];
+}
+
+// Forces are means about their rows, as of a load cell that samples at this interval: over the half of it that follows the last
+// row, and the half that comes before the next; the very last one over all of the interval before it.
+void Recorder::save_forces() {
+    const bool is_first = record_.series.empty();
+    for (std::size_t d = 0; d < record_.reactions.size(); ++d) {
+        auto& [after, before] = halves_;
+        std::vector<Vec2>& force = record_.reactions[d].force;
+        if (record_.series.size() > 1 && after.count > 0) {
+            const double count = static_cast<double>(before_last_row_ + after.count);
+            force.back() = (static_cast<double>(before_last_row_) * force.back() + after.reactions[d]) / count;
+        }
+        const auto steps = static_cast<double>(std::max(1L, before.count + after.count));
+        since_last_row_[d] = (before.reactions[d] + after.reactions[d]) / steps;
+        const HalfInterval& last = before.count > 0 ? before : after;
+        force.push_back(last.count > 0 ? Vec2(last.reactions[d] / static_cast<double>(last.count)) : Vec2::Zero());
+    }
+    if (!is_first && !record_.reactions.empty()) record_.series.back().force = force_of(record_.series.size() - 1);
+    before_last_row_ = halves_[1].count > 0 ? halves_[1].count : halves_[0].count;
+    for (HalfInterval& half : halves_) half = {0, std::vector<Vec2>(record_.reactions.size(), Vec2::Zero())};
+}
+
+// What the load cell shows in a row [N].
+double Recorder::force_of(std::size_t row) const {
+    return record_.reactions[gauges_.force].force[row].dot(gauges_.force_direction);
 }
 
 Instant Recorder::now() const {
     Instant now = record_.series.empty() ? Instant{} : record_.series.back();
     now.time = solver_.time();
-    if (!reaction_sum_.empty()) now.displacement = solver_.moved(gauges_.displacement).dot(gauges_.displacement_direction);
+    if (!record_.reactions.empty()) now.displacement = solver_.moved(gauges_.displacement).dot(gauges_.displacement_direction);
     if (crack_ >= 0) {
         now.crack_length = solver_.cracks().lines[crack_].length;
         now.tip = solver_.cracks().lines[crack_].tip(at_end_).position;
@@ -118,14 +148,8 @@ void Recorder::look() {
 void Recorder::save_row() {
     finite_ = solver_.is_finite();
     Instant row = now();
-    for (std::size_t d = 0; d < reaction_sum_.size(); ++d) {
-        // The mean since the row before, as of a load cell that samples at this interval.
-        const Vec2 mean = reaction_count_ > 0 ? Vec2(reaction_sum_[d] / static_cast<double>(reaction_count_)) : Vec2::Zero();
-        record_.reactions[d].force.push_back(mean);
-        reaction_sum_[d].setZero();
-    }
-    reaction_count_ = 0;
-    if (!record_.reactions.empty()) row.force = record_.reactions[gauges_.force].force.back().dot(gauges_.force_direction);
+    save_forces();
+    if (!record_.reactions.empty()) row.force = force_of(record_.series.size());
 
     for (int k = 0; k < static_cast<int>(scene_.cracks.size()); ++k) {
         const bool end = k == crack_ ? at_end_ : scene_.cracks[k].grows != Growth::start;
@@ -172,6 +196,7 @@ void Recorder::thin_out() {
         halve(c.K_I);
         halve(c.K_II);
     }
+    next_row_ += interval_;
     interval_ *= 2;
 }
 
@@ -200,6 +225,8 @@ void Recorder::finish(RunStatus status, std::string message) {
     record_.message = std::move(message);
     record_.steps = steps_;
     if (record_.series.back().time < solver_.time()) save_row();
+    for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.back() = since_last_row_[d];
+    if (!record_.reactions.empty()) record_.series.back().force = force_of(record_.series.size() - 1);
     if (scene_.output.frames > 0 && record_.frames.back().time < solver_.time()) {
         if (static_cast<int>(record_.frames.size()) == scene_.output.frames) record_.frames.pop_back();
         save_frame();

@@ -3,6 +3,8 @@
 #include "datasets/record.hpp"
 #include "forward/explicit.hpp"
 
+#include <array>
+
 namespace crampfit {
 
 /// The points with this displacement; when that is and the crack are the caller's.
@@ -41,7 +43,14 @@ class Recorder {
     Record take() { return std::move(record_); }
 
   private:
+    struct HalfInterval {
+        long count = 0;               // steps
+        std::vector<Vec2> reactions;  // their sums
+    };
+
     void save_row();
+    void save_forces();
+    double force_of(std::size_t row) const;
     void save_frame();
     void read_due_probes();
     void read_probes_now();
@@ -61,10 +70,11 @@ class Recorder {
     long steps_ = 0;
     long next_row_ = 0;
     int frames_saved_ = 0;
-    std::vector<Vec2> reaction_sum_;
-    long reaction_count_ = 0;
-    double largest_energy_ = 0.0;     // [J]
-    double largest_imbalance_ = 0.0;  // [J]
+    std::array<HalfInterval, 2> halves_;  // of the interval between two rows
+    long before_last_row_ = 0;            // steps in the force of the last row
+    std::vector<Vec2> since_last_row_;    // means over all of the last interval [N]
+    double largest_energy_ = 0.0;         // [J]
+    double largest_imbalance_ = 0.0;      // [J]
     bool finite_ = true;
 };
 

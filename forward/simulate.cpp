@@ -1,5 +1,6 @@
 #include "forward/simulate.hpp"
 
+#include "forward/deformation.hpp"
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
 #include "forward/march.hpp"
@@ -102,6 +103,32 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
                     100.0 * (with / without - 1.0), 1e3 * last->displacement);
 }
 
+// Says so where wood that was modelled by small strain has turned: under tractions no plan knows how far it will go.
+void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSolver& solver, Record& record) {
+    constexpr double much = 0.9, counts = 0.1;  // of the points; more than so much [rad]: its false strain is half the square
+    std::vector<double> turns;
+    for (int p = 0; p < body.points.count() && !plan.rotates; ++p) {
+        const Mat2 gradient = gradient_at(body, p, solver.displacements());
+        turns.push_back(0.5 * std::abs(gradient(1, 0) - gradient(0, 1)));
+    }
+    if (turns.empty()) return;
+    const auto at = turns.begin() + static_cast<std::ptrdiff_t>(much * static_cast<double>(turns.size() - 1));
+    std::ranges::nth_element(turns, at);
+    if (*at > counts)
+        record.message +=
+            fmt::format("; small strain: a tenth of the wood has turned by more than {:.2g} rad, see solver.strain = "
+                        "\"finite rotation\"",
+                        *at);
+}
+
+// Says so where the energy books do not close, as they do to a hundredth on any scene that the grid resolves.
+void judge_books(Record& record) {
+    constexpr double counts = 0.05;
+    if (record.worst_energy_imbalance > counts)
+        record.message += fmt::format("; energy books open by up to {:.2g} % of the largest energy: do not trust this run",
+                                      100.0 * record.worst_energy_imbalance);
+}
+
 Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
                    const SimulateOptions& options) {
     long step = 0;
@@ -164,6 +191,8 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         recorder.add_step();
     }
     Record record = recorder.take();
+    judge_turns(plan, body, solver, record);
+    judge_books(record);
     if (solver.fastest_crack() > 0.0) record.message += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());
     return record;
 }

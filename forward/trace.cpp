@@ -267,7 +267,12 @@ class Tracer {
         if (!done_ && until > from.load.time) go(from, moment(i, until));
     }
 
-    double next_sample(double time) const { return (std::floor(time / sample_ + rounding) + 1.0) * sample_; }
+    // There is one where all motion ends: power goes in a step there.
+    double next_sample(double time) const {
+        const double next = (std::floor(time / sample_ + rounding) + 1.0) * sample_;
+        return moves_at(time) ? std::min(next, plan_.still_from) : next;
+    }
+    bool moves_at(double time) const { return time < plan_.still_from - rounding * sample_; }
 
     void add(const Moment& m, bool jumped) {
         if (!record_.series.empty() && m.load.time <= record_.series.back().time) return;
@@ -299,8 +304,9 @@ class Tracer {
         row.fracture_energy = m.fracture_energy;
         if (!record_.series.empty()) {
             const Moment& before = last_;
-            const double work = 0.5 * (before.load.power + m.load.power) * (m.load.time - before.load.time) +
-                                m.load.traction_work - before.load.traction_work;
+            const double moved = moves_at(before.load.time) ? m.load.time - before.load.time : 0.0;
+            const double work =
+                0.5 * (before.load.power + m.load.power) * moved + m.load.traction_work - before.load.traction_work;
             row.external_work = record_.series.back().external_work + work;
             // A jump turns what it releases beyond the toughness into motion, which is not followed.
             if (!jumped)

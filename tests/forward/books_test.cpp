@@ -1,0 +1,256 @@
+// In motion: energy books where a scene makes them hard, and forces and rows as they should be.
+#include "datasets/error.hpp"
+#include "tests/forward/scenes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace crampfit::test {
+namespace {
+
+constexpr double closed = 0.01;  // energy books, of the largest energy: as asked of every scene
+
+// A bar along x of E = 40 MPa without Poisson's effect, 300 kg/m^3.
+Scene bar(double length, double cell) {
+    Scene scene = block({length, 2e-3}, cell);
+    scene.model.plane = PlaneCondition::stress;
+    scene.materials["EW"].poisson_ratio = 0.0;
+    return scene;
+}
+const double bar_wave = std::sqrt(40e6 / 300.0);  // [m/s]
+
+// A crack that is torn from the left side across, 20 J/m^2.
+Scene torn(StressUpdate stresses) {
+    Scene scene = block({10e-3, 12e-3}, 0.25e-3);
+    scene.materials["EW"].toughness = 20.0;
+    scene.edges = {moving("top", Side::top, {0.5, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(0, 6.1e-3), Vec2(3e-3, 6.1e-3)};
+    crack.grows = Growth::end;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.stress_update = stresses;
+    scene.stop.time = 0.3e-3;
+    return scene;
+}
+
+TEST(VerificationBooks, CloseForEachStressUpdateAsACrackGrows) {
+    for (const StressUpdate stresses : {StressUpdate::first, StressUpdate::average, StressUpdate::last}) {
+        const Record record = simulate(torn(stresses));
+        std::printf("stresses updated %s: books %.4f, crack %.2f mm\n",
+                    stresses == StressUpdate::first  ? "first"
+                    : stresses == StressUpdate::last ? "last"
+                                                     : "on average",
+                    record.worst_energy_imbalance, 1e3 * record.series.back().crack_length);
+        EXPECT_GT(record.series.back().crack_length, 8e-3);
+        EXPECT_LT(record.worst_energy_imbalance, closed);
+    }
+}
+
+// A wave of pressure goes through a closed crack as through whole wood, and the faces take nothing.
+TEST(VerificationBooks, CloseAcrossAClosedCrackForEachVelocityUpdate) {
+    for (const auto& [update, order] : {std::pair{VelocityUpdate::automatic, 1},
+                                        {VelocityUpdate::fmpm, 2},
+                                        {VelocityUpdate::fmpm, 4},
+                                        {VelocityUpdate::pic, 1}}) {
+        Scene scene = bar(40e-3, 0.5e-3);
+        scene.edges = {without(moving("left", Side::left, {0.1, 0.0}), 1), without(moving("right", Side::right, {0.0, 0.0}), 1)};
+        Crack crack;
+        crack.points = {Vec2(20.1e-3, 0), Vec2(20.1e-3, 2e-3)};
+        scene.cracks = {crack};
+        scene.measure = {"right", "left"};
+        scene.solver.velocity_update = update;
+        scene.solver.order = order;
+        scene.stop.time = 80e-3 / bar_wave;
+        const Record record = simulate(scene);
+        double mean = 0.0;
+        int count = 0;
+        for (const Instant& row : record.series)
+            if (row.time > 50e-3 / bar_wave) mean += row.force, ++count;
+        const double expected = -2.0 * 300.0 * bar_wave * 0.1 * 2e-3;
+        std::printf("closed crack, update %d, order %d: books %.4f, force behind the wave %.3f of a bar's\n",
+                    static_cast<int>(update), order, record.worst_energy_imbalance, mean / count / std::abs(expected));
+        EXPECT_NEAR(std::abs(mean / count), std::abs(expected), 0.02 * std::abs(expected));
+        EXPECT_LT(record.worst_energy_imbalance, closed);
+    }
+}
+
+// Two cracks that start in a hole and leave the specimen: the tips take up the toughness times their way.
+TEST(VerificationBooks, CracksOutOfAHolePayForTheirWay) {
+    Scene scene = block({10e-3, 10e-3}, 0.25e-3);
+    scene.materials["EW"].toughness = 20.0;
+    scene.specimen.cutouts = {Circle{Vec2(5e-3, 5e-3), 1e-3}};
+    scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    double drawn = 0.0;
+    for (const double side : {1.0, -1.0}) {
+        Crack crack;
+        crack.points = {Vec2(5e-3 + side * 0.5e-3, 5.1e-3), Vec2(5e-3 + side * 1.6e-3, 5.1e-3)};
+        crack.grows = Growth::end;
+        crack.direction = GrowthDirection::straight;
+        scene.cracks.push_back(crack);
+        drawn += 1.6e-3;
+    }
+    scene.measure = {"top", "top"};
+    scene.stop.time = 0.3e-3;
+    const Record record = simulate(scene);
+    const double spent = record.series.back().fracture_energy / (20.0 * (10e-3 - drawn));
+    std::printf("cracks out of a hole: fracture energy %.3f of toughness times area, books %.4f\n", spent,
+                record.worst_energy_imbalance);
+    EXPECT_EQ(record.status, RunStatus::split);
+    EXPECT_NEAR(spent, 1.0, 0.05);  // a tip that waves hold back takes up more
+    EXPECT_LT(record.worst_energy_imbalance, closed);
+}
+
+// Two equal squares whose corners lie on one line: nothing before they touch, then they change their velocities.
+TEST(VerificationBooks, PartsOfOneHeightMeetWhereTheyMeet) {
+    constexpr double speed = 0.4, gap = 0.5e-3, side = 10e-3;
+    Scene scene = block({40e-3, 14e-3}, 0.5e-3);
+    const auto square = [](double x) {
+        return Polygon{{Vec2(x, 2e-3), Vec2(x + side, 2e-3), Vec2(x + side, 2e-3 + side), Vec2(x, 2e-3 + side)}};
+    };
+    scene.specimen.parts = {Part{square(2e-3), Vec2(speed, 0.0)}, Part{square(12e-3 + gap), Vec2::Zero()}};
+    scene.stop.time = gap / speed;
+    Trial run(scene);
+    const double start = run.solver.energies().kinetic;
+    run.until(0.9 * gap / speed);
+    EXPECT_NEAR(run.solver.energies().kinetic, start, 1e-9 * start);
+    run.until(gap / speed + 4.0 * side / bar_wave);
+    const EnergyBooks books = run.solver.energies();
+    std::printf("squares of one height: %.3f of the energy after the impact\n", (books.kinetic + books.strain) / start);
+    EXPECT_NEAR((books.kinetic + books.strain + books.contact) / start, 1.0, closed);
+}
+
+// A rigid punch at v against a bar's end: stress = rho c v, however fast it comes.
+TEST(VerificationBooks, AFastBodyIsMetInTime) {
+    for (const double v : {5.0, 25.0}) {
+        Scene scene = bar(20e-3, 0.25e-3);
+        scene.edges = {without(moving("left", Side::left, {0.0, 0.0}), 1)};
+        const double x = 20.52e-3;
+        Body punch;
+        punch.name = "punch";
+        punch.shape = Polygon{{Vec2(x, -1e-3), Vec2(x + 4e-3, -1e-3), Vec2(x + 4e-3, 3e-3), Vec2(x, 3e-3)}};
+        punch.velocity = {-v, 0.0};
+        scene.bodies = {punch};
+        scene.measure = {"punch", "punch"};
+        scene.solver.strain = StrainMeasure::small;
+        const double touch = 0.52e-3 / v;
+        scene.stop.time = touch + 14e-3 / bar_wave;
+        scene.output.samples = 200;
+        const Record record = simulate(scene);
+        double mean = 0.0;
+        int count = 0;
+        for (const Instant& row : record.series)
+            if (row.time > touch + 4e-3 / bar_wave) mean += row.force, ++count;
+        const double expected = 300.0 * bar_wave * v * 2e-3;
+        std::printf("punch at %.0f m/s: force %.3f of rho c v, books %.4f\n", v, mean / count / expected,
+                    record.worst_energy_imbalance);
+        EXPECT_NEAR(mean / count, expected, 0.03 * expected);
+        EXPECT_LT(record.worst_energy_imbalance, closed);
+    }
+}
+
+// G of a tip that runs does not hang on how fast the specimen goes as a whole.
+TEST(VerificationBooks, GDoesNotHangOnTheFrame) {
+    const auto rates = [](double speed) {
+        Scene scene = torn(StressUpdate::last);
+        for (Edge& edge : scene.edges) edge.velocity[0] = *edge.velocity[0] + speed;
+        scene.specimen.parts = {Part{Polygon{{Vec2(0, 0), Vec2(10e-3, 0), Vec2(10e-3, 12e-3), Vec2(0, 12e-3)}}, Vec2(speed, 0)}};
+        return simulate(scene);
+    };
+    const Record rest = rates(0.0), moving = rates(13.0);
+    ASSERT_EQ(rest.series.size(), moving.series.size());
+    double most = 0.0, off = 0.0;
+    for (std::size_t i = 0; i < rest.series.size(); ++i) {
+        most = std::max(most, rest.series[i].G);
+        off = std::max(off, std::abs(moving.series[i].G - rest.series[i].G));
+    }
+    std::printf("G in a frame at 13 m/s: off by %.1e of the largest\n", off / most);
+    EXPECT_LT(off, 1e-6 * most);
+}
+
+// Rows hold the force of their own displacement: a bar drawn slowly follows E A / L at ten rows as at a thousand.
+TEST(VerificationRows, ForceBelongsToItsDisplacement) {
+    Scene scene = bar(10e-3, 0.5e-3);
+    scene.edges = {without(moving("right", Side::right, {0.01, 0.0}), 1), without(moving("left", Side::left, {0.0, 0.0}), 1)};
+    scene.measure = {"right", "right"};
+    scene.solver.damping = 2e4;
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.stop.displacement = 0.1e-3;
+    scene.output.samples = 10;
+    const Record record = simulate(scene);
+    for (std::size_t i = 2; i + 1 < record.series.size(); ++i) {
+        const double exact = 40e6 * 2e-3 / 10e-3 * record.series[i].displacement;
+        EXPECT_NEAR(record.series[i].force, exact, 0.005 * exact) << i;
+    }
+}
+
+// A time that only guards does not thin the rows out.
+TEST(UnitRows, AGuardingTimeCostsNone) {
+    Scene scene = at_motion(torn(StressUpdate::last));
+    scene.stop.crack_length = 8e-3;
+    std::size_t rows[2];
+    for (const int k : {0, 1}) {
+        scene.stop.time = k == 0 ? 0.3e-3 : 1.0;
+        rows[k] = simulate(scene).series.size();
+    }
+    EXPECT_EQ(rows[0], rows[1]);
+    EXPECT_GT(rows[0], 100u);
+}
+
+TEST(UnitPlan, RunsThatNeverEndAreRefused) {
+    Scene scene = bar(10e-3, 0.5e-3);
+    scene.edges = {without(moving("right", Side::right, {1.0, 0.0}), 1), without(moving("left", Side::left, {0.0, 0.0}), 1)};
+    scene.measure = {"right", "right"};
+    scene.stop.displacement = 0.1e-3;
+    EXPECT_NO_THROW(explain(scene));
+    scene.edges[0].until = 0.05e-3;
+    EXPECT_THROW(explain(scene), InputError);
+    scene.edges[0].until.reset();
+    scene.measure.displacement = "left";
+    EXPECT_THROW(explain(scene), InputError);
+    scene.stop.time = 1e-3;
+    EXPECT_NO_THROW(explain(scene));
+    scene.edges.push_back(without(moving("again", Side::right, {-1.0, 0.0}), 1));  // holds nothing
+    EXPECT_THROW(simulate(scene), InputError);
+}
+
+// At equilibrium: the work of an edge that stops is what the specimen keeps.
+TEST(VerificationBooks, AnEdgeThatStopsHasDoneItsWork) {
+    Scene scene = at_rest({10e-3, 12e-3}, 0.5e-3);
+    scene.edges = {moving("top", Side::top, {0.0, 0.05}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.edges[0].until = 1.03e-3;
+    scene.measure = {"top", "top"};
+    scene.stop.time = 3e-3;
+    const Record record = simulate(scene);
+    const Instant& last = record.series.back();
+    EXPECT_GT(last.strain_energy, 0.0);
+    EXPECT_NEAR(last.external_work, last.strain_energy, 1e-9 * last.strain_energy);
+    EXPECT_LT(record.worst_energy_imbalance, 1e-9);
+}
+
+// The same where closed faces rub: what they have not taken is kept, and the hold asks for no further equilibria.
+TEST(VerificationBooks, AnEdgeThatStopsOverFacesThatRub) {
+    Scene scene = at_rest({10e-3, 12e-3}, 0.5e-3);
+    scene.edges = {moving("top", Side::top, {0.0, -0.05}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(3e-3, 4e-3), Vec2(7e-3, 8e-3)};
+    crack.faces.kind = CrackFaces::Kind::friction;
+    crack.faces.coefficient = 0.3;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 1e-3;
+    const Record loaded = simulate(scene);
+    scene.edges[0].until = 1e-3;
+    scene.stop.time = 3e-3;
+    const Record held = simulate(scene);
+    EXPECT_EQ(held.status, RunStatus::finished);
+    EXPECT_LE(held.steps, loaded.steps);
+    EXPECT_NEAR(held.series.back().force, loaded.series.back().force, 1e-9 * std::abs(loaded.series.back().force));
+    EXPECT_NEAR(held.series.back().external_work, loaded.series.back().external_work, 1e-3 * loaded.series.back().external_work);
+}
+
+}  // namespace
+}  // namespace crampfit::test
