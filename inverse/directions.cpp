@@ -5,6 +5,7 @@
 #include <Eigen/SVD>
 
 #include <algorithm>
+#include <vector>
 
 namespace crampfit {
 namespace {
@@ -13,17 +14,57 @@ namespace {
 // difference makes a value that is zero look like something.
 constexpr double resolution = 1e-3;
 
+// Next to the longest column: below that a slope is what rounding leaves of none.
+constexpr double rounding = 1e-9;
+
+// Which columns tell their parameter's effect from none. To scale the others to length one would make of their scatter an effect
+// as large as any, which no direction that it is mixed into could be told from.
+std::vector<Eigen::Index> columns_with_effect(const Eigen::VectorXd& length, const Eigen::VectorXd& error) {
+    std::vector<Eigen::Index> columns;
+    for (Eigen::Index j = 0; j < length.size(); ++j) {
+        if (length[j] > std::max(rounding * length.maxCoeff(), 2 * error[j])) {
+            columns.push_back(j);
+        }
+    }
+    return columns;
+}
+
 Directions take_apart(const Run& best, const LocalModel& model, double radius) {
     const Eigen::MatrixXd jacobian = model.jacobian();
-    Directions result{best, model, radius, {}, {}, {}, {}, {}};
-    // A parameter without any effect keeps a column of zeros.
-    result.scale = jacobian.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian * result.scale.asDiagonal(), Eigen::ComputeThinU | Eigen::ComputeThinV);
-    result.singular = svd.singularValues();
-    result.u = svd.matrixU();
-    result.v = svd.matrixV();
-    const Eigen::VectorXd column_error = model.jacobian_error().cwiseProduct(result.scale);
-    result.error = (column_error.asDiagonal() * result.v).colwise().norm();
+    const Eigen::Index p = jacobian.cols();
+    const Eigen::VectorXd length = jacobian.colwise().norm(), error = model.jacobian_error();
+    const std::vector<Eigen::Index> told = columns_with_effect(length, error);
+    const auto count = static_cast<Eigen::Index>(told.size());
+    Directions result{best,
+                      model,
+                      radius,
+                      Eigen::MatrixXd::Zero(jacobian.rows(), p),
+                      Eigen::VectorXd::Ones(p),
+                      Eigen::VectorXd::Zero(p),
+                      Eigen::VectorXd::Zero(p),
+                      Eigen::MatrixXd::Zero(jacobian.rows(), p),
+                      Eigen::MatrixXd::Zero(p, p)};
+    for (const Eigen::Index j : told) {
+        result.slope.col(j) = jacobian.col(j);
+        result.scale[j] = 1 / length[j];
+    }
+    if (count > 0) {
+        const Eigen::MatrixXd scaled = result.slope(Eigen::all, told) * result.scale(told).asDiagonal();
+        const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeThinU | Eigen::ComputeThinV);
+        result.singular.head(count) = svd.singularValues();
+        result.u.leftCols(count) = svd.matrixU();
+        result.v(told, Eigen::seqN(0, count)) = svd.matrixV();
+        const Eigen::VectorXd column_error = error(told).cwiseProduct(result.scale(told));
+        result.error.head(count) = (column_error.asDiagonal() * svd.matrixV()).colwise().norm();
+    }
+    // Each parameter without effect is a direction by itself, with a singular value of zero.
+    Eigen::Index next = count;
+    for (Eigen::Index j = 0; j < p; ++j) {
+        if (std::find(told.begin(), told.end(), j) == told.end()) {
+            result.error[next] = length[j] > rounding * length.maxCoeff() ? error[j] : 0.0;
+            result.v(j, next++) = 1;
+        }
+    }
     return result;
 }
 
@@ -31,13 +72,14 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
 
 bool Directions::resolved(Eigen::Index k) const { return singular[k] > std::max(resolution * singular[0], 2 * error[k]); }
 
-bool Directions::all_resolved() const {
+bool Directions::wider_would_tell() const {
     for (Eigen::Index k = 0; k < singular.size(); ++k) {
-        if (!resolved(k)) {
-            return false;
+        const bool has_no_effect = singular[k] == 0 && error[k] == 0;
+        if (!resolved(k) && !has_no_effect) {
+            return true;
         }
     }
-    return true;
+    return false;
 }
 
 std::optional<Directions> directions_about_best(Objective& objective, double step) {
@@ -53,7 +95,7 @@ std::optional<Directions> directions_about_best(Objective& objective, double ste
         }
         if (const auto model = LocalModel::fit(objective.runs(), best.x, 1.5 * radius)) {
             found = take_apart(best, *model, radius);
-            if (found->all_resolved()) {
+            if (!found->wider_would_tell()) {
                 return found;
             }
         }

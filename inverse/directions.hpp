@@ -10,11 +10,13 @@
 namespace crampfit {
 
 /// How the residuals change about the best run: the slope J of a polynomial through the runs near it, its columns
-/// scaled to length one, taken apart into singular values.
+/// scaled to length one, taken apart into singular values. A parameter whose column cannot be told from none has a column of
+/// zeros and a direction of its own.
 struct Directions {
     Run best;
     LocalModel model;
     double radius = 0;         // of the differences that the model rests on, a part of the box
+    Eigen::MatrixXd slope;     // J [residuals x parameters]
     Eigen::VectorXd scale;     // of x: 1 / length of J's columns [parameters]
     Eigen::VectorXd singular;  // falling [parameters]
     Eigen::VectorXd error;     // one sigma of each singular value, by the model's scatter [parameters]
@@ -23,7 +25,9 @@ struct Directions {
 
     /// Whether J tells direction k from zero.
     bool resolved(Eigen::Index k) const;
-    bool all_resolved() const;
+
+    /// Whether wider differences may tell more than these: of a direction that scatter hides, not of one without any effect.
+    bool wider_would_tell() const;
 };
 
 /// Runs the differences about the best run that have not been run yet, and takes wider ones where the model's scatter

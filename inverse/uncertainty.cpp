@@ -53,8 +53,12 @@ class Undetermined {
                 is_member_[j] = true;
             }
         }
-        message_ += members.size() == 1 ? members.front() + " cannot be told from this data. "
-                                        : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
+        const std::string sentence = members.size() == 1
+                                         ? members.front() + " cannot be told from this data. "
+                                         : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
+        if (message_.find(sentence) == std::string::npos) {  // several directions may be made of the same parameters
+            message_ += sentence;
+        }
     }
 
     bool contains(Eigen::Index j) const { return is_member_[static_cast<std::size_t>(j)]; }
@@ -89,7 +93,10 @@ Eigen::MatrixXd data_covariance(const Directions& directions, double widening, U
 Eigen::MatrixXd model_covariance(const Directions& directions) {
     const Eigen::Index p = directions.scale.size();
     const LocalModel& model = directions.model;
-    const Eigen::VectorXd off = lowest_point(model, directions.best.x, 1.5 * directions.radius) - directions.best.x;
+    Eigen::VectorXd off = lowest_point(model, directions.best.x, 1.5 * directions.radius) - directions.best.x;
+    for (Eigen::Index j = 0; j < p; ++j) {
+        off[j] = directions.slope.col(j).isZero(0.0) ? 0.0 : off[j];  // it lies anywhere
+    }
     Eigen::MatrixXd covariance = off * off.transpose();
     if (model.freedom() > 0) {
         Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(p, model.scatter().cols());
@@ -166,7 +173,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     result.covariance = in_box(data_covariance(*directions, widening, undetermined)) + own;
     result.widening = widening;
     result.model_variance = own.diagonal();
-    result.slope = directions->model.jacobian() * window.axes.inverse();
+    result.slope = directions->slope * window.axes.inverse();
     result.untold = undetermined.message();
     result.message += result.untold;
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
