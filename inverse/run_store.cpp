@@ -50,6 +50,9 @@ std::uint64_t fingerprint(const Study& study) {
     for (const Parameter& parameter : study.parameters) {
         for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
             print.add(parameter.keys[k]).add(parameter.factor(k));
+            if (find_machine_number(study, parameter.keys[k], study.file.string(), "(any)")) {
+                print.add(parameter.lower).add(parameter.upper);  // which rows are compared (covered_data)
+            }
         }
         if (parameter.prior) {
             print.add(parameter.prior->mean).add(parameter.prior->sd);

@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "inverse/pool.hpp"
+#include "inverse/run_end.hpp"
 #include "inverse/study_check.hpp"
 
 #include <algorithm>
@@ -37,8 +38,14 @@ double softened(double r, Loss loss) {
 }  // namespace
 
 StudyModel::StudyModel(const Study& study, Forward forward, double model_resolution, const std::atomic<bool>* stop)
-    : study_(checked(study)), resolution_(model_resolution), box_(study.parameters),
-      comparisons_(comparisons_at(model_resolution)), runs_(study, std::move(forward), stop) {
+    : study_(checked(study)), tests_(study.experiments), resolution_(model_resolution), box_(study.parameters),
+      runs_(study, std::move(forward), stop) {
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+        const CoveredData covered = covered_data(study, i);
+        tests_[i].data = covered.curves;
+        left_out_.push_back(covered.remark);
+    }
+    comparisons_ = comparisons_at(model_resolution);
     std::size_t stations = 0;
     for (const Comparison& comparison : comparisons_) {
         stations += comparison.stations().size();
@@ -52,7 +59,7 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
 
 std::vector<Comparison> StudyModel::comparisons_at(double resolution) const {
     std::vector<Comparison> comparisons;
-    for (const Experiment& experiment : study_.experiments) {
+    for (const Experiment& experiment : tests_) {
         comparisons.emplace_back(experiment, resolution);
     }
     return comparisons;
@@ -86,7 +93,7 @@ double StudyModel::likely_resolution(const Evaluation& evaluation, double most) 
         double sum = 0;
         Eigen::Index row = 0;
         for (std::size_t i = 0; i < comparisons_.size(); ++i) {
-            const Comparison comparison(study_.experiments[i], resolution);
+            const Comparison comparison(tests_[i], resolution);
             for (std::size_t k = 0; k < comparison.stations().size(); ++k) {
                 const FitResidual& station = comparison.stations()[k];
                 const double r = softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss);
@@ -192,8 +199,9 @@ std::vector<FitResidual> StudyModel::residuals(const Evaluation& evaluation) con
 
 std::string StudyModel::remarks() const {
     std::string text;
-    for (const Comparison& comparison : comparisons_) {
-        for (const std::string& remark : comparison.remarks()) {
+    for (std::size_t i = 0; i < comparisons_.size(); ++i) {
+        text += left_out_[i].empty() ? "" : left_out_[i] + " ";
+        for (const std::string& remark : comparisons_[i].remarks()) {
             text += remark + " ";
         }
     }

@@ -56,6 +56,8 @@ class StudyModel {
     std::vector<Comparison> comparisons_at(double resolution) const;
 
     const Study& study_;
+    std::vector<Experiment> tests_;      // with what runs can be compared with
+    std::vector<std::string> left_out_;  // of the data, for a person
     double resolution_;
     UnitBox box_;
     std::vector<Comparison> comparisons_;  // one an experiment

@@ -1,5 +1,6 @@
 #include "inverse/fit.hpp"
 #include "datasets/error.hpp"
+#include "inverse/run_end.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -69,6 +70,69 @@ TEST(SystemFit, ReportsWhatItDid) {
         sum += residual.residual * residual.residual;
     }
     EXPECT_NEAR(sum, fit.misfit, 1e-9 * fit.misfit);
+}
+
+// A run that its stop has ended says nothing of what the force is beyond.
+TEST(SystemFit, DataBeyondTheEndOfTheRunsAreLeftOut) {
+    FakeWedge wedge;
+    wedge.sharpness = 1;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.experiments[0].scene.file = "wedge.toml";
+    study.experiments[0].scene.stop.displacement = 0.4e-3;
+    FakeWedge stopped = wedge;
+    stopped.last_displacement = 0.4e-3;
+    const Fit fit = fit_study(study, with(stopped));
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    for (const FittedParameter& parameter : fit.parameters) {
+        const double truth = &parameter == &fit.parameters[0] ? true_earlywood : true_latewood;
+        EXPECT_LT(std::abs(parameter.value - truth), 3 * parameter.standard_error);
+        EXPECT_LT(parameter.standard_error, 0.05 * truth);
+    }
+    for (const FitResidual& residual : fit.residuals) {
+        EXPECT_LE(residual.kind == "arrival" ? residual.measured : residual.at, 0.4e-3);
+    }
+    EXPECT_NE(fit.message.find("wedge: stop.displacement = 0.4 mm ends the runs before the data, which go to 0.6 mm: rows from "
+                               "0.4003 mm on are left out."),
+              std::string::npos)
+        << fit.message;
+    // By time, and with what a fixture that may give lets the specimen lag behind.
+    study.experiments[0].data.displacement.clear();
+    study.experiments[0].scene.stop = {.displacement = {}, .crack_length = {}, .time = 0.2e-3};
+    EXPECT_NE(fit_study(study, with(stopped)).message.find("wedge: stop.time = 0.0002 s ends the runs"), std::string::npos);
+    study.experiments[0].scene.stop.time = -1.0;
+    try {
+        fit_study(study, with(stopped));
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.file, "wedge.toml");
+        EXPECT_EQ(error.key, "stop.time");
+        EXPECT_NE(error.rule.find("which go from 0 to 0.0003 s"), std::string::npos) << error.rule;
+    }
+}
+
+TEST(SystemFit, WhatTheMachineTakesOfTheDisplacementDoesNotEndTheRunsEarlier) {
+    FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    Experiment& experiment = study.experiments[0];
+    experiment.machine.compliance = 1e-6;
+    experiment.scene.stop.displacement = 0.6e-3;
+    for (std::size_t i = 0; i < experiment.data.displacement.size(); ++i) {
+        experiment.data.displacement[i] += 1e-6 * experiment.data.force[i];
+    }
+    EXPECT_EQ(covered_data(study, 0).remark.find("ends the runs"), std::string::npos);
+    // An offset that may be negative is taken off the end.
+    Parameter offset;
+    offset.name = "offset";
+    offset.keys = {"experiments.wedge.displacement_offset"};
+    offset.lower = -0.1e-3;
+    offset.upper = 0.1e-3;
+    study.parameters.push_back(offset);
+    const CoveredData covered = covered_data(study, 0);
+    double last = 0;
+    for (const double u : covered.curves.displacement) {
+        last = std::isnan(u) ? last : u;
+    }
+    EXPECT_NEAR(last - 1e-6 * experiment.data.force[666], 0.5e-3, 1e-6);
 }
 
 class EveryMethod : public ::testing::TestWithParam<std::string> {};

@@ -1,0 +1,165 @@
+#include "inverse/run_end.hpp"
+
+#include "datasets/error.hpp"
+#include "datasets/machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+
+namespace crampfit {
+namespace {
+
+constexpr double rounding = 1e-9;  // of where a run ends
+constexpr double unbounded = std::numeric_limits<double>::infinity();
+
+/// How what is measured as displacement moves.
+struct Drive {
+    double speed = 0;  // [m/s]
+    double until = unbounded;
+};
+
+// Absent where it moves by a force.
+std::optional<Drive> drive_of(const Scene& scene) {
+    for (const Edge& edge : scene.edges) {
+        const double speed = std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0));
+        if (edge.name == scene.measure.displacement && speed > 0) {
+            return Drive{speed, edge.until.value_or(unbounded)};
+        }
+    }
+    for (const Body& body : scene.bodies) {
+        if (body.name == scene.measure.displacement && body.velocity.norm() > 0 && !body.free[0] && !body.free[1]) {
+            return Drive{body.velocity.norm(), body.until.value_or(unbounded)};
+        }
+    }
+    return std::nullopt;
+}
+
+/// Where runs end at the latest, and by which key of the scene.
+struct RunEnd {
+    double at = unbounded;  // of the specimen [m], or [s]
+    std::string key;
+
+    void take(double other, const std::string& other_key) {
+        if (other < at) {
+            at = other;
+            key = other_key;
+        }
+    }
+};
+
+RunEnd end_of_runs(const Scene& scene, bool by_time) {
+    const std::optional<Drive> drive = drive_of(scene);
+    RunEnd end;
+    if (scene.stop.displacement && !by_time) {
+        end.take(*scene.stop.displacement, "stop.displacement");
+    }
+    if (scene.stop.displacement && by_time && drive && *scene.stop.displacement <= drive->speed * drive->until) {
+        end.take(*scene.stop.displacement / drive->speed, "stop.displacement");
+    }
+    if (scene.stop.time && by_time) {
+        end.take(*scene.stop.time, "stop.time");
+    }
+    if (scene.stop.time && !by_time && drive) {
+        end.take(drive->speed * std::min(*scene.stop.time, drive->until), "stop.time");
+    }
+    return end;
+}
+
+/// A number of the machine: from its lowest to its highest value.
+struct Range {
+    double low;
+    double high;
+};
+
+Range range_of(const Study& study, std::size_t experiment, double Machine::*value) {
+    const double given = study.experiments[experiment].machine.*value;
+    for (const Parameter& parameter : study.parameters) {
+        for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
+            const auto found = find_machine_number(study, parameter.keys[k], study.file.string(), "(any)");
+            if (found && found->experiment == experiment && found->number->value == value) {
+                const auto [low, high] =
+                    std::minmax({parameter.factor(k) * parameter.lower, parameter.factor(k) * parameter.upper});
+                return {low, high};
+            }
+        }
+    }
+    return {given, given};
+}
+
+// The farthest that the specimen may have been moved when the test recorded this row [m].
+double farthest(double displacement, double force, const Range& compliance, const Range& force_offset, const Range& offset) {
+    double of_machine = std::isnan(force) ? 0.0 : unbounded;
+    for (const double c : {compliance.low, compliance.high}) {
+        for (const double zero : {force_offset.low, force_offset.high}) {
+            of_machine = std::min(of_machine, c * (force - zero));
+        }
+    }
+    return displacement - (std::isnan(force) ? 0.0 : of_machine) - offset.low;
+}
+
+bool is_measured(const std::vector<double>& column) {
+    return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
+}
+
+}  // namespace
+
+CoveredData covered_data(const Study& study, std::size_t experiment) {
+    const Experiment& test = study.experiments[experiment];
+    const Curves& data = test.data;
+    const bool by_time = !is_measured(data.displacement);
+    const std::vector<double>& abscissa = by_time ? data.time : data.displacement;
+    const RunEnd end = end_of_runs(test.scene, by_time);
+    if (!is_measured(abscissa) || end.at == unbounded) {
+        return {data, ""};
+    }
+    const Range compliance = range_of(study, experiment, &Machine::compliance);
+    const Range force_offset = range_of(study, experiment, &Machine::force_offset);
+    const Range offset = range_of(study, experiment, &Machine::displacement_offset);
+    double first = unbounded, last = -unbounded, beyond = unbounded;  // of the rows, and of those that no run need come to
+    for (std::size_t i = 0; i < abscissa.size(); ++i) {
+        if (std::isnan(abscissa[i])) {
+            continue;
+        }
+        const double force = data.force.empty() ? std::nan("") : data.force[i];
+        const double at = by_time ? abscissa[i] : farthest(abscissa[i], force, compliance, force_offset, offset);
+        first = std::min(first, abscissa[i]);
+        last = std::max(last, abscissa[i]);
+        if (at > end.at * (1 + rounding)) {
+            beyond = std::min(beyond, abscissa[i]);
+        }
+    }
+    const char* const unit = by_time ? "s" : "mm";
+    const double units = by_time ? 1.0 : 1e3;
+    const double stop = end.key == "stop.time" ? *test.scene.stop.time : 1e3 * *test.scene.stop.displacement;
+    const std::string stop_text = fmt::format("{:g} {}", stop, end.key == "stop.time" ? "s" : "mm");
+    if (beyond <= first) {
+        const std::string file = test.scene.file.empty() ? "scene of " + test.name : test.scene.file.string();
+        throw InputError(
+            file, end.key, stop_text,
+            fmt::format("ends each run before the data begin, which go from {:g} to {:g} {}", units * first, units * last, unit));
+    }
+    if (beyond == unbounded) {
+        return {data, ""};
+    }
+    CoveredData covered{data, fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} "
+                                          "on are left out.",
+                                          test.name, end.key, stop_text, units * last, unit, units * beyond, unit)};
+    for (std::size_t i = 0; i < abscissa.size(); ++i) {
+        if (abscissa[i] >= beyond) {
+            for (std::vector<double> Curves::*column :
+                 {&Curves::time, &Curves::displacement, &Curves::force, &Curves::crack_length}) {
+                if (!(covered.curves.*column).empty()) {
+                    (covered.curves.*column)[i] = std::nan("");
+                }
+            }
+        }
+    }
+    return covered;
+}
+
+}  // namespace crampfit

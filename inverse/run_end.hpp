@@ -1,0 +1,22 @@
+#pragma once
+
+#include "datasets/experiment.hpp"
+
+#include <cstddef>
+#include <string>
+
+namespace crampfit {
+
+/// Data of which every run of the scene has something to say.
+struct CoveredData {
+    Curves curves;
+    std::string remark;  // on what was left out, for a person; empty: nothing
+};
+
+/// The rows of an experiment's data up to where the scene's stop by displacement or time ends each run, whatever the parameters:
+/// with the machine's numbers that are fitted anywhere in their bounds, and a compliance by the measured force. What follows a
+/// run that ends there is unknown; one that ends earlier, as the specimen splits or the crack is as long as it shall be, goes on
+/// as Comparison has it. Throws InputError, naming the stop, where no row is left.
+CoveredData covered_data(const Study& study, std::size_t experiment);
+
+}  // namespace crampfit
