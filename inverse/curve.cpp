@@ -78,6 +78,47 @@ int Curve::count(double from, double to) const {
     return static_cast<int>(std::lower_bound(x_.begin(), x_.end(), to) - std::lower_bound(x_.begin(), x_.end(), from));
 }
 
+double Curve::error_of_mean(double from, double to) const {
+    constexpr double narrow = 1e-9;  // as in `mean`
+    if (!(to - from > narrow * (x_.back() - x_.front()))) {
+        const double at = std::clamp(0.5 * (from + to), x_.front(), x_.back());
+        const auto above = std::max<std::ptrdiff_t>(1, std::lower_bound(x_.begin(), x_.end(), at) - x_.begin());
+        if (x_.size() == 1) {
+            return 1;
+        }
+        const auto i = static_cast<std::size_t>(above);
+        const double s = (at - x_[i - 1]) / (x_[i] - x_[i - 1]);
+        return std::hypot(1 - s, s);
+    }
+    double squares = 0, weight = std::max(0.0, std::min(to, x_.front()) - from);  // of the node at hand: what lies to its left
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        double next = 0;
+        if (i + 1 < x_.size()) {
+            const double low = std::max(from, x_[i]), high = std::min(to, x_[i + 1]);
+            if (low < high) {
+                const double part = (0.5 * (low + high) - x_[i]) / (x_[i + 1] - x_[i]);  // of the next node, in the mean
+                weight += (1 - part) * (high - low);
+                next = part * (high - low);
+            }
+        } else {
+            weight += std::max(0.0, to - std::max(from, x_.back()));
+        }
+        squares += weight * weight;
+        weight = next;
+    }
+    return std::sqrt(squares) / (to - from);
+}
+
+double Curve::widest_step(double from, double to) const {
+    double widest = 0;
+    for (std::size_t i = 0; i + 1 < x_.size(); ++i) {
+        if (x_[i] < to && x_[i + 1] > from) {
+            widest = std::max(widest, x_[i + 1] - x_[i]);
+        }
+    }
+    return widest;
+}
+
 Curve Curve::smoothed(double window) const {
     Curve result = *this;
     for (std::size_t i = 0; i < x_.size(); ++i) {

@@ -21,6 +21,12 @@ class Curve {
     double mean(double from, double to) const;  // average over an interval; of no width: the value there
     int count(double from, double to) const;    // nodes in [from, to)
 
+    /// Standard deviation of that average where each node has an error of its own, of one.
+    double error_of_mean(double from, double to) const;
+
+    /// The widest step from node to node that lies at least partly within an interval; 0 where there is none.
+    double widest_step(double from, double to) const;
+
     /// The same nodes, each with the average over a window about it. Near an end the window shrinks from both sides
     /// alike, so that a straight line stays what it is.
     Curve smoothed(double window) const;

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <functional>
 #include <numeric>
+#include <utility>
 
 namespace crampfit {
 namespace {
@@ -153,6 +154,30 @@ double sampling_error(const Curve& rows, double from, double to, const std::func
     return std::sqrt(variance);
 }
 
+using Intervals = std::vector<std::pair<double, double>>;  // from, to
+
+// Over which intervals the rows of a tile are averaged: over all of it where rows are close, next to a window; else from first to
+// last row of those that lie no farther apart than half of one, at the least a single row. A line across a gap is nobody's
+// measurement, and a row's share in the tiles on both sides of it would let their errors go together.
+Intervals averaged_in(const Curve& rows, double from, double to, double window) {
+    constexpr double close = 0.25, together = 0.5;
+    if (rows.widest_step(from, to) <= close * window) {
+        return {{from, to}};
+    }
+    Intervals groups;
+    for (const double x : rows.x()) {
+        if (x < from || x > to || (x == to && to < rows.x().back())) {
+            continue;  // it belongs to the next tile
+        }
+        if (!groups.empty() && x - groups.back().second <= together * window) {
+            groups.back().second = x;
+        } else {
+            groups.emplace_back(x, x);
+        }
+    }
+    return groups;
+}
+
 }  // namespace
 
 Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
@@ -210,20 +235,11 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
     return sigma;
 }
 
-double Comparison::force_at(const Curve& force, double at) const {
-    // Data and model are cut to the same range, so that near its ends they are averaged alike.
-    const double half = std::clamp(std::min(at - from_, to_ - at), 0.0, 0.5 * window_);
-    return force.mean(at - half, at + half);
-}
-
 void Comparison::add_force_stations(const Experiment& experiment) {
     const Curve rows(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
-    from_ = rows.x().front();
-    to_ = rows.x().back();
-    window_ = smoothing_window * (to_ - from_);
+    const double from = rows.x().front(), to = rows.x().back();
     const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
-    const bool sparse = static_cast<int>(rows.x().size()) <= tiles;
     double peak = 0;
     for (const double force : rows.y()) {
         peak = std::max(peak, std::abs(force));
@@ -233,23 +249,24 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         const double by = std::abs(before) - std::abs(after);
         return by > clear * usual ? by : 0.0;
     };
-    const int stations = sparse ? static_cast<int>(rows.x().size()) : tiles;
-    for (int i = 0; i < stations; ++i) {
-        const double at = sparse ? rows.x()[static_cast<std::size_t>(i)] : from_ + (i + 0.5) * window_;
-        const int averaged = sparse ? 1 : rows.count(at - 0.5 * window_, at + 0.5 * window_);
-        if (averaged == 0) {
-            continue;  // a gap in the data
-        }
+    for (int i = 0; i < tiles; ++i) {
+        const auto averaged =
+            averaged_in(rows, std::lerp(from, to, static_cast<double>(i) / tiles),
+                        std::lerp(from, to, static_cast<double>(i + 1) / tiles), smoothing_window * (to - from));
+        force_tiles_.insert(force_tiles_.end(), averaged.begin(), averaged.end());
+    }
+    for (const auto& tile : force_tiles_) {
+        const double at = std::midpoint(tile.first, tile.second), half = 0.5 * (tile.second - tile.first);
         FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
-        station.measured = force_at(rows, at);
-        const double of_noise = noise / std::sqrt(averaged);
+        station.measured = rows.mean(tile.first, tile.second);
+        const double averaging = rows.error_of_mean(tile.first, tile.second);
         const auto place_error = [&](double sigma) {
-            return shift_error([&](double x) { return force_at(rows, x); }, at, sigma, from_, to_);
+            return shift_error([&](double x) { return rows.mean(x - half, x + half); }, at, sigma, from + half, to - half);
         };
-        const double of_data_place = place_error(abscissa_noise_) / std::sqrt(averaged);
+        const double of_noise = noise * averaging;
+        const double of_data_place = place_error(abscissa_noise_) * averaging;
         const double of_model_place = place_error(model_resolution_ * at);
-        const double of_sampling =
-            sampling_error(rows, std::max(from_, at - 0.5 * window_), std::min(to_, at + 0.5 * window_), fall);
+        const double of_sampling = half > 0 ? sampling_error(rows, tile.first, tile.second, fall) : 0.0;
         const double of_model_force = model_resolution_ * peak;
         station.sigma = Eigen::Vector<double, 5>(of_noise, of_sampling, of_data_place, of_model_place, of_model_force).norm();
         stations_.push_back(station);
@@ -337,8 +354,9 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
         const auto tile_up_to = [&](double to) {
             const auto tiles = static_cast<int>(std::lround((to - from) / arrival_window_));
             for (int i = 0; i < tiles; ++i) {
-                length_tiles_.emplace_back(std::lerp(from, to, static_cast<double>(i) / tiles),
-                                           std::lerp(from, to, static_cast<double>(i + 1) / tiles));
+                const auto averaged = averaged_in(rows, std::lerp(from, to, static_cast<double>(i) / tiles),
+                                                  std::lerp(from, to, static_cast<double>(i + 1) / tiles), arrival_window_);
+                length_tiles_.insert(length_tiles_.end(), averaged.begin(), averaged.end());
             }
         };
         for (const double arrival : arrivals) {
@@ -356,20 +374,17 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
     }
     const double longest = *std::max_element(rows.y().begin(), rows.y().end());
     const auto jump = [&](double before, double after) { return after - before > clear * noise ? after - before : 0.0; };
-    const auto is_empty = [&](const auto& tile) { return tile.first < tile.second && rows.count(tile.first, tile.second) == 0; };
-    std::erase_if(length_tiles_, is_empty);  // gaps in the data
     for (const auto& [from, to] : length_tiles_) {
         const double at = std::midpoint(from, to), half = 0.5 * (to - from);
-        const double averaged = std::max(1, rows.count(from, to));
+        const double averaging = rows.error_of_mean(from, to);
         const auto place_error = [&](double sigma) {
             return shift_error([&](double u) { return rows.mean(u - half, u + half); }, at, sigma, first, last);
         };
         FitResidual station{.experiment = experiment.name, .kind = "crack_length", .at = at, .measured = rows.mean(from, to)};
         const double of_sampling = half > 0 ? sampling_error(rows, from, to, jump) : 0.0;
-        station.sigma =
-            Eigen::Vector<double, 5>(noise / std::sqrt(averaged), of_sampling, place_error(abscissa_noise_) / std::sqrt(averaged),
-                                     place_error(model_resolution_ * at), model_resolution_ * longest)
-                .norm();
+        station.sigma = Eigen::Vector<double, 5>(noise * averaging, of_sampling, place_error(abscissa_noise_) * averaging,
+                                                 place_error(model_resolution_ * at), model_resolution_ * longest)
+                            .norm();
         stations_.push_back(station);
         counts_.push_back(1.0);
     }
@@ -408,10 +423,11 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
     const Curve length(abscissa, lengths), crack = length.smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());
     std::vector<double> values;
-    auto tile = length_tiles_.begin();
+    auto tile = length_tiles_.begin(), force_tile = force_tiles_.begin();
     for (const FitResidual& station : stations_) {
         if (station.kind == "force") {
-            values.push_back(force_at(force, station.at));
+            values.push_back(force.mean(force_tile->first, force_tile->second));
+            ++force_tile;
         } else if (station.kind == "arrival") {
             values.push_back(crack.arrival(station.at).value_or(end + pace_ * (station.at - longest)));
         } else if (station.kind == "crack_length") {

@@ -20,10 +20,11 @@ class Curve;
 ///
 /// Force: at displacements (at times where no displacement was measured). Explicit runs and tests vibrate, so both
 /// curves get the same moving-window average, `smoothing_window` of the measured range wide, and the stations stand one
-/// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. With no
-/// more rows than that, a station stands on each row. Latewood bands that the crack crosses one by one leave peaks some
-/// tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next, as the crack jumps,
-/// when it did so is known to the rows' distance only, which counts as an error of its own.
+/// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. Where rows are
+/// fewer than four a window, those of a window that are no farther apart than half of it are averaged from the first to the last
+/// of them, and rows farther apart are stations themselves: no line across a gap counts. Latewood bands that the crack crosses
+/// one by one leave peaks some tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next,
+/// as the crack jumps, when it did so is known to the rows' distance only, which counts as an error of its own.
 ///
 /// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer
 /// than it grows from row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the
@@ -71,19 +72,16 @@ class Comparison {
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
-    double force_at(const Curve& force, double at) const;
 
     double model_resolution_;
     bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
     std::vector<double> abscissa_;  // measured displacement [m] or time [s], a row
     double abscissa_noise_ = 0;     // one sigma [m] or [s]
-    double from_ = 0;               // range in which force was measured [m] or [s]
-    double to_ = 0;
-    double window_ = 0;          // of the average of force [m] or [s]
-    double arrival_window_ = 0;  // of the average of crack length [m] or [s]
-    double arrival_end_ = 0;     // of the measured crack lengths
-    double pace_ = 0;            // mean displacement (time) a length of growth in the test [m/m] or [s/m]
-    std::vector<std::pair<double, double>> length_tiles_;  // from, to [m] or [s]: one a station of crack length
+    double arrival_window_ = 0;     // of the average of crack length [m] or [s]
+    double arrival_end_ = 0;        // of the measured crack lengths
+    double pace_ = 0;               // mean displacement (time) a length of growth in the test [m/m] or [s/m]
+    std::vector<std::pair<double, double>> force_tiles_;   // from, to [m] or [s]: one a station of force
+    std::vector<std::pair<double, double>> length_tiles_;  // the same of crack length
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
     std::vector<double> counts_;         // [stations]
