@@ -100,10 +100,10 @@ bool take_profile(CloseLook& look) {
         return false;
     }
     const bool told = all_told(u);
-    const double level = u.quantile * u.quantile * u.widening;
     double least = look.objective.best()->evaluation->misfit;
     Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
     for (Eigen::Index j = 0; j < lower.size(); ++j) {
+        const double level = u.rise[j];
         CloseLook::Along way = look.along(j);
         const double scale = way.window.axes(j, 0);
         double below = 0, above = 0;  // distances
@@ -178,7 +178,7 @@ CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
 }
 
 std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
-                                    const std::vector<int>& curve_lengths, const std::vector<std::string>& names, unsigned seed) {
+                                    const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed) {
     // Nothing where the user's stop comes before the first run.
     const auto look = [&](const Window& window) -> std::optional<CloseLook> {
         const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) {
@@ -193,7 +193,7 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
         if (!here.objective.best()) {
             return std::nullopt;
         }
-        here.uncertainty = estimate_uncertainty(here.objective, curve_lengths, names, difference_step, window);
+        here.uncertainty = estimate_uncertainty(here.objective, curves, names, difference_step, window);
         return here;
     };
     const auto first = look(as_wide_as_the_misfit_says(near, x));
@@ -223,7 +223,7 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
 }
 
 bool is_lower(const Run& one, const Run& other, const Uncertainty& about) {
-    return one.evaluation->misfit < other.evaluation->misfit - as_good * about.widening;
+    return one.evaluation->misfit < other.evaluation->misfit - as_good * about.temperature;
 }
 
 std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,

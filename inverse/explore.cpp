@@ -35,8 +35,6 @@ std::optional<Objective> surrogate(const Objective& objective, const Uncertainty
         0, 1);
 }
 
-double rise_of(const Uncertainty& uncertainty) { return uncertainty.quantile * uncertainty.quantile * uncertainty.widening; }
-
 }  // namespace
 
 Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& uncertainty, const UncertaintyChoice& choice,
@@ -61,7 +59,7 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
             return Run{uncertainty.best.x, model.at(uncertainty.best.x)};
         }();
         for (Eigen::Index j = 0; j < model.parameters(); ++j) {
-            const double rise = rise_of(uncertainty);
+            const double rise = uncertainty.rise[j];
             if (cheap && close) {
                 CloseLook::Along way = close->along(j);
                 way.objective.set_budget_left(runs_of_a_profile);
@@ -82,7 +80,7 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
         const auto log_likelihood = [&](const Evaluation& evaluation) {
             const Eigen::VectorXd& r = evaluation.residuals;
             const double of_priors = r.tail(r.size() - data_residuals).squaredNorm();
-            return -0.5 * (r.head(data_residuals).squaredNorm() / uncertainty.widening + of_priors);
+            return -0.5 * (r.head(data_residuals).squaredNorm() / uncertainty.temperature + of_priors);
         };
         const Eigen::MatrixXd inverse = window.axes.inverse();
         result.posterior = draw_ensemble(model, log_likelihood, window.share(uncertainty.best.x),
@@ -111,7 +109,7 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertain
             fit.profile.push_back({parameter.name, value_at(profile.x[i]), profile.misfit[i]});
         }
         const double least = *std::min_element(profile.misfit.begin(), profile.misfit.end());
-        const auto [lower, upper] = interval(profile, least, rise_of(uncertainty));
+        const auto [lower, upper] = interval(profile, least, uncertainty.rise[k]);
         // The model's own scatter, which no profile of it shows, comes on top.
         const double x = uncertainty.best.x[k];
         const double own = uncertainty.quantile * std::sqrt(uncertainty.model_variance[k]);

@@ -24,7 +24,7 @@ struct Exploration {
 
 /// Profiles and posterior about the best run, on runs of the model where `cheap`, through a `close` look where there is one, and
 /// else on a quadratic model of the residuals about it. `data_residuals` come first in an evaluation's residuals, priors follow;
-/// the likelihood of the data is tempered by uncertainty.widening, as the covariance is.
+/// the likelihood of the data is tempered by uncertainty.temperature, as the covariance is.
 Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& uncertainty, const UncertaintyChoice& choice,
                     int data_residuals, bool cheap, unsigned seed, const std::function<void(const std::string&)>& stage);
 

@@ -205,7 +205,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         std::future<Evaluation> wide;    // there, the best values on cells twice as wide
         const auto estimate = [&] {
             if (!by_walks) {
-                return estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
+                return estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));
             }
             const auto look = [&] {
                 if (wide.valid()) {  // of what was the best point before: the same runs for any number of threads
@@ -214,11 +214,11 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 const Eigen::VectorXd x = objective.best()->x;
                 runs.walks().catch_up(runs.values_at(x));
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
-                return look_close(objective, runs.nearby().near(x), x, model.curve_lengths(), names, options.seed);
+                return look_close(objective, runs.nearby().near(x), x, model.curves(), names, options.seed);
             };
             close = look_and_descend(objective, look, [&] { found.converged = runs.descend_again(); });
             return close ? close->uncertainty
-                         : estimate_uncertainty(objective, model.curve_lengths(), names, difference_step, Window(box.size()));
+                         : estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));
         };
         const auto look_around = [&](const Uncertainty& about) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {

@@ -4,6 +4,7 @@
 #include "inverse/curve.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -189,9 +190,14 @@ Comparison::Comparison(const Experiment& experiment, double model_resolution) : 
         add_curves(experiment);
     }
     if (fields_) {
+        if (const auto& given = experiment.noise.displacement_field) {
+            noise_.push_back(fmt::format("displacement_field {:.3g} mm", 1e3 * *given));
+        }
         stations_.insert(stations_.end(), fields_->stations().begin(), fields_->stations().end());
     }
     counts_.resize(stations_.size(), 1.0);
+    const std::string noise = noise_.empty() ? "as the fields have it" : fmt::format("{}", fmt::join(noise_, ", "));
+    remarks_.push_back(fmt::format("{}: noise (one sigma): {}; weight {:g}.", experiment.name, noise, experiment.weight));
     if (stations_.empty()) {
         throw bad_data(experiment, "crack_length", "constant",
                        "must grow by more than its noise, as there is no force to compare");
@@ -210,6 +216,10 @@ void Comparison::add_curves(const Experiment& experiment) {
     abscissa_ = by_time_ ? data.time : data.displacement;
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
     check_rises(experiment, abscissa_, by_time_ ? "time" : "displacement");
+    if (abscissa_noise_ > 0) {
+        noise_.push_back(by_time_ ? fmt::format("time {:.3g} s", abscissa_noise_)
+                                  : fmt::format("displacement {:.3g} mm", 1e3 * abscissa_noise_));
+    }
     if (measured(data.force)) {
         add_force_stations(experiment);
     }
@@ -220,7 +230,10 @@ void Comparison::add_curves(const Experiment& experiment) {
 
 double Comparison::noise_of(const Experiment& experiment, const char* what, const Curve& rows,
                             const std::optional<double>& given) {
+    const bool force = std::string(what) == "force";
+    const auto in_unit = [&](double sigma) { return fmt::format("{:.3g} {}", force ? sigma : 1e3 * sigma, force ? "N" : "mm"); };
     if (given) {
+        noise_.push_back(fmt::format("{} {}", what, in_unit(*given)));
         return *given;
     }
     const auto [low, high] = std::minmax_element(rows.y().begin(), rows.y().end());
@@ -229,9 +242,9 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
     if (!(sigma > 0)) {
         throw bad_data(experiment, what, "0", "is zero throughout; its noise must be given");
     }
-    const bool force = std::string(what) == "force";
-    remarks_.push_back(fmt::format("{}: the noise of {} was not given; {:.3g} {} was estimated from the scatter of the rows.",
-                                   experiment.name, what, force ? sigma : 1e3 * sigma, force ? "N" : "mm"));
+    noise_.push_back(fmt::format("{} {}", what, in_unit(sigma)));
+    remarks_.push_back(fmt::format("{}: the noise of {} was not given; {} was estimated from the scatter of the rows.",
+                                   experiment.name, what, in_unit(sigma)));
     return sigma;
 }
 

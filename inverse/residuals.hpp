@@ -61,7 +61,7 @@ class Comparison {
     /// `slack_force` is what the load cell says once the specimen has split [N].
     Eigen::VectorXd modelled(const Record& record, double slack_force = 0.0) const;
 
-    /// What a person should know about how the data was used, such as noise that had to be estimated.
+    /// What a person should know about how the data was used: the noise that it is taken to have, and its weight.
     const std::vector<std::string>& remarks() const { return remarks_; }
 
   private:
@@ -85,6 +85,7 @@ class Comparison {
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
     std::vector<double> counts_;         // [stations]
+    std::vector<std::string> noise_;     // of each column, in words
     std::vector<std::string> remarks_;
 };
 

@@ -171,18 +171,20 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
     evaluation.misfit = evaluation.residuals.squaredNorm();
 }
 
-std::vector<int> StudyModel::curve_lengths() const {
-    std::vector<int> lengths;
-    for (const Comparison& comparison : comparisons_) {
+MeasuredCurves StudyModel::curves() const {
+    MeasuredCurves curves;
+    for (std::size_t i = 0; i < comparisons_.size(); ++i) {
+        const std::vector<FitResidual>& stations = comparisons_[i].stations();
         for (const char* kind : {"force", "arrival", "crack_length", "u_x", "u_y"}) {
-            const auto count = std::count_if(comparison.stations().begin(), comparison.stations().end(),
+            const auto count = std::count_if(stations.begin(), stations.end(),
                                              [kind](const FitResidual& station) { return station.kind == kind; });
             if (count > 0) {
-                lengths.push_back(static_cast<int>(count));
+                curves.lengths.push_back(static_cast<int>(count));
+                curves.roots.push_back(std::sqrt(tests_[i].weight));
             }
         }
     }
-    return lengths;
+    return curves;
 }
 
 std::vector<FitResidual> StudyModel::residuals(const Evaluation& evaluation) const {

@@ -5,6 +5,7 @@
 #include "inverse/objective.hpp"
 #include "inverse/residuals.hpp"
 #include "inverse/scene_runs.hpp"
+#include "inverse/uncertainty.hpp"
 #include "inverse/unit_box.hpp"
 
 #include <string>
@@ -48,7 +49,7 @@ class StudyModel {
     double likely_resolution(const Evaluation& evaluation, double most) const;
 
     const UnitBox& box() const { return box_; }
-    std::vector<int> curve_lengths() const;                       // stations of each measured curve, in order
+    MeasuredCurves curves() const;
     std::vector<FitResidual> residuals(const Evaluation&) const;  // of a usable evaluation, without priors
     std::string remarks() const;                                  // on the data, for a person
 

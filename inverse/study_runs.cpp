@@ -117,7 +117,7 @@ Evaluation StudyRuns::run(const Eigen::VectorXd& x, int share) {
 SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
                                 const std::function<void(const std::string&)>& stage) {
     // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
-    const std::vector<int> lengths = model_.curve_lengths();
+    const std::vector<int> lengths = model_.curves().lengths;
     const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
     SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
     found.converged = weigh_and_descend(found.converged, enough > 0);

@@ -2,6 +2,9 @@
 
 #include "inverse/directions.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -25,6 +28,14 @@ double correlation_time(const Eigen::VectorXd& r) {
         time += 2 * rho;
     }
     return time;
+}
+
+Eigen::VectorXd weights_of(const MeasuredCurves& curves) {
+    std::vector<double> weights;
+    for (std::size_t i = 0; i < curves.lengths.size(); ++i) {
+        weights.insert(weights.end(), static_cast<std::size_t>(curves.lengths[i]), curves.root(i) * curves.root(i));
+    }
+    return Eigen::Map<Eigen::VectorXd>(weights.data(), static_cast<Eigen::Index>(weights.size()));
 }
 
 // Mean over the curves, by their lengths.
@@ -71,22 +82,49 @@ class Undetermined {
     std::string message_;
 };
 
-// s (J^T J)^-1, direction by direction; an undetermined one gets the variance of a uniform distribution over the box.
-Eigen::MatrixXd data_covariance(const Directions& directions, double widening, Undetermined& undetermined) {
-    const Eigen::Index p = directions.scale.size();
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
+// What data and priors know of the best point in the parameters' units of a window.
+struct Knowledge {
+    Eigen::MatrixXd covariance;  // told + that of what cannot be told
+    Eigen::MatrixXd told;        // (D^-1 + P)^-1
+    Eigen::MatrixXd curvature;   // inverse of that of half the misfit: (J^T W J + P)^-1
+};
+
+// By directions; an undetermined one gets the variance of a uniform distribution over the box.
+Knowledge knowledge(const Directions& directions, const Eigen::VectorXd& weights, double widening, Undetermined& undetermined) {
+    const Eigen::Index p = directions.scale.size(), data = weights.size(), priors = directions.slope.rows() - data;
+    const Eigen::MatrixXd scaled = directions.slope * directions.scale.asDiagonal() * directions.v;  // by directions
+    const Eigen::MatrixXd of_data = scaled.topRows(data), of_priors = scaled.bottomRows(priors);
+    const Eigen::MatrixXd weighted = weights.cwiseSqrt().asDiagonal() * of_data;
+    const Eigen::MatrixXd nothing = Eigen::MatrixXd::Zero(p, p);
+    Knowledge known{nothing, nothing, nothing};
+    std::vector<Eigen::Index> told;
     for (Eigen::Index k = 0; k < p; ++k) {
         const Eigen::VectorXd direction = directions.scale.cwiseProduct(directions.v.col(k));
         const double largest = direction.cwiseAbs().maxCoeff();
-        const double singular = directions.singular[k];
-        if (directions.resolved(k) && 4 * std::sqrt(widening) * largest < singular) {
-            covariance += widening * direction * direction.transpose() / (singular * singular);
+        const double noise =
+            of_data.col(k).squaredNorm() > 0 ? widening * weighted.col(k).squaredNorm() / of_data.col(k).squaredNorm() : 1.0;
+        const double precision = of_data.col(k).squaredNorm() / noise + of_priors.col(k).squaredNorm();
+        if (directions.resolved(k) && 4 * largest < std::sqrt(precision)) {
+            told.push_back(k);
         } else {
-            covariance += direction * direction.transpose() / (12 * largest * largest);
+            known.covariance += direction * direction.transpose() / (12 * largest * largest);
             undetermined.add(direction);
         }
     }
-    return covariance;
+    if (!told.empty()) {
+        const Eigen::MatrixXd a = of_data(Eigen::all, told).transpose() * of_data(Eigen::all, told);    // J^T W J
+        const Eigen::MatrixXd b = weighted(Eigen::all, told).transpose() * weighted(Eigen::all, told);  // J^T W^2 J
+        const Eigen::MatrixXd prior = of_priors(Eigen::all, told).transpose() * of_priors(Eigen::all, told);
+        const Eigen::MatrixXd precision = a * b.completeOrthogonalDecomposition().solve(a) / widening;  // D^-1
+        const Eigen::MatrixXd way = directions.scale.asDiagonal() * directions.v(Eigen::all, told);
+        const auto inverse = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+            return way * m.ldlt().solve(Eigen::MatrixXd::Identity(m.rows(), m.cols())) * way.transpose();
+        };
+        known.told = inverse(precision + prior);
+        known.covariance += known.told;
+        known.curvature = inverse(a + prior);
+    }
+    return known;
 }
 
 // How the model's noise moves the best run: by each run's scatter, and off the lowest point of the polynomial.
@@ -137,17 +175,18 @@ double student_975(int degrees_of_freedom) {
     return 0.5 * (low + high);
 }
 
-Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names, double step, const Window& window) {
+Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& curves, const std::vector<std::string>& names,
+                                 double step, const Window& window) {
     const auto directions = directions_about_best(objective, step);
     Uncertainty result;
     result.best = *objective.best();
     result.best.x = window.inside(result.best.x);
     const Eigen::VectorXd& x = result.best.x;
-    const Eigen::VectorXd& residuals = result.best.evaluation->residuals;
+    const Eigen::VectorXd weights = weights_of(curves);
     const int p = static_cast<int>(x.size());
-    const int count = static_cast<int>(residuals.size());
-    result.reduced_chi_square = result.best.evaluation->misfit / std::max(1, count - p);
+    const int count = static_cast<int>(weights.size());
+    const Eigen::VectorXd residuals = result.best.evaluation->residuals.head(count).cwiseQuotient(weights.cwiseSqrt());
+    result.reduced_chi_square = residuals.squaredNorm() / std::max(1, count - p);
     result.lower_95 = Eigen::VectorXd::Zero(p);
     result.upper_95 = Eigen::VectorXd::Ones(p);
     if (!directions) {
@@ -155,7 +194,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
         result.message = "Too few runs ended well near the best one to tell how sure it is: the intervals are the whole box. ";
         return result;
     }
-    const double time = correlation_time(residuals, curve_lengths);
+    const double time = correlation_time(residuals, curves.lengths);
     const double widening = std::max(1.0, result.reduced_chi_square * time);
     int independent = count;
     if (widening > 1) {
@@ -170,8 +209,10 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
         return window.axes * covariance * window.axes.transpose();
     };
     const Eigen::MatrixXd own = in_box(model_covariance(*directions));
-    result.covariance = in_box(data_covariance(*directions, widening, undetermined)) + own;
+    const Knowledge known = knowledge(*directions, weights, widening, undetermined);
+    result.covariance = in_box(known.covariance) + own;
     result.widening = widening;
+    result.temperature = widening * weights.squaredNorm() / weights.sum();
     result.model_variance = own.diagonal();
     result.slope = directions->slope * window.axes.inverse();
     result.untold = undetermined.message();
@@ -184,8 +225,11 @@ Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& c
     }
     const double t = student_975(std::max(1, independent - p));
     result.quantile = t;
+    result.rise = Eigen::VectorXd::Constant(p, t * t * result.temperature);
+    const Eigen::MatrixXd spread = in_box(known.told), curvature = in_box(known.curvature);
     for (Eigen::Index j = 0; j < p; ++j) {
         if (!undetermined.contains(j)) {
+            result.rise[j] = t * t * spread(j, j) / curvature(j, j);
             const double half = t * std::sqrt(result.covariance(j, j));
             result.lower_95[j] = std::max(0.0, x[j] - half);
             result.upper_95[j] = std::min(1.0, x[j] + half);

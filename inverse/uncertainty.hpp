@@ -10,6 +10,14 @@
 
 namespace crampfit {
 
+/// The measured curves that residuals are of, in the order in which the residuals hold them; priors follow.
+struct MeasuredCurves {
+    std::vector<int> lengths;        // residuals of each curve
+    std::vector<double> roots = {};  // of the weight by which each curve's residuals have been multiplied; empty: all 1
+
+    double root(std::size_t curve) const { return roots.empty() ? 1.0 : roots[curve]; }
+};
+
 /// How sure the best point is, in the unit cube.
 struct Uncertainty {
     Run best;                    // the run that all of this is about
@@ -19,30 +27,34 @@ struct Uncertainty {
     double reduced_chi_square = 0;
     std::string message;                  // what the intervals rest on, and what cannot be told, for a person
     double widening = 1;                  // s: of variances, for what the noise does not explain
+    double temperature = 1;               // T: of the data's likelihood exp(-misfit / 2 T), s and the weights taken in
     double quantile = 2;                  // of Student's distribution, from standard error to interval
     std::string untold = {};              // which parameters cannot be told (apart), for a person; part of `message` too
     Eigen::MatrixXd slope = {};           // J [residuals x parameters]; empty where it is not known
     Eigen::VectorXd model_variance = {};  // diagonal of V [parameters]; empty where it is not known
+    Eigen::VectorXd rise = {};            // of the misfit at the ends of a parameter's interval; empty where it is not known
 };
 
 /// Intervals about the best run, from how the residuals change with the parameters near it. Runs the differences about
-/// the best point that have not been run yet. `curve_lengths` are the lengths of the measured curves, in the order in
-/// which the residuals hold them; priors follow. `names` are the parameters'; `step` is that of differences, a part of the box.
+/// the best point that have not been run yet. `names` are the parameters'; `step` is that of differences, a part of the box.
 /// The objective's points are those of a window of the box, and differences go along its axes; all that is told is of the box.
 /// There must be a usable run.
 ///
-/// covariance = s (J^T J)^-1 + V, J being the slope of a polynomial fitted to the runs about the best point and
-///  s = max(1, chi^2 tau), chi^2 the reduced chi-square and tau the correlation time of the residuals along their
-///  curves: what
-///      the stated noise does not explain is taken for noise, and residuals that go together count once;
+/// covariance = (D^-1 + P)^-1 + V,  D = s (J^T W J)^-1 J^T W^2 J (J^T W J)^-1, J being the slope of a polynomial fitted to the
+/// runs about the best point, without priors, and
+///  W = the weights: they say how much a curve has to say, not how large its noise is, so that a factor on all of them changes
+///  nothing (the sandwich of White 1980, Econometrica 48, for noise that is known); s (J^T J)^-1 where all are 1;
+///  P = what the priors know, which nothing widens;
+///  s = max(1, chi^2 tau), chi^2 the reduced chi-square of the data without weights and tau the correlation time of the
+///  residuals along their curves: what the stated noise does not explain is taken for noise, and residuals that go together
+///  count once;
 ///  V = how far the model's own scatter, run by run, moves the best point, and how far the best run is from the lowest
-///  point of
-///      the polynomial: noise, or a search that ended early.
+///  point of the polynomial: noise, or a search that ended early.
 /// A direction in which the window has less than two standard errors either side of its middle is undetermined: it gets
 /// the variance of a uniform distribution over the window, and the parameters that it is made of get the whole box as
 /// their interval.
-Uncertainty estimate_uncertainty(Objective& objective, const std::vector<int>& curve_lengths,
-                                 const std::vector<std::string>& names, double step, const Window& window);
+Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& curves, const std::vector<std::string>& names,
+                                 double step, const Window& window);
 
 /// The 97.5 % point of Student's t distribution.
 double student_975(int degrees_of_freedom);

@@ -44,8 +44,7 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
         const double width = std::log(400.0 / 20.0);
         objective.at(Eigen::Vector2d(std::log(true_earlywood / 20) / width, std::log(true_latewood / 20) / width));
         const crampfit::Run best = *objective.best();
-        const Uncertainty about =
-            estimate_uncertainty(objective, model.curve_lengths(), {"EW", "LW"}, difference_step, Window(2));
+        const Uncertainty about = estimate_uncertainty(objective, model.curves(), {"EW", "LW"}, difference_step, Window(2));
         ASSERT_EQ(about.best.x, best.x);
         Evaluation wide = *best.evaluation;
         const auto stations = model.residuals(wide);

@@ -297,7 +297,7 @@ TEST(UnitCloseLook, GivesWhatIsKnownWhenTheUserStops) {
             return curved(x);
         };
         const Objective objective(2, curved, 100, 1, &stop);
-        const auto look = look_close(objective, evaluate, lowest, {3}, {"a", "b"}, 1);
+        const auto look = look_close(objective, evaluate, lowest, {{3}}, {"a", "b"}, 1);
         if (!look) {
             EXPECT_TRUE(stop) << runs;
             continue;
@@ -330,7 +330,7 @@ TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
             return evaluation;
         };
         const Objective objective(2, valley, 100, 1);
-        const auto look = look_close(objective, valley, bottom, {30}, {"a", "b"}, 1);
+        const auto look = look_close(objective, valley, bottom, {{30}}, {"a", "b"}, 1);
         ASSERT_TRUE(look);
         const Uncertainty& found = look->uncertainty;
         const auto error_along = [&](const Vector2d& way) { return std::sqrt(0.5 * way.dot(found.covariance * way)); };
@@ -366,7 +366,7 @@ TEST(UnitCloseLook, GoesDownToALowerValleyThatItComesUpon) {
     int descents = 0;
     const auto look = [&] {
         return look_close(
-            objective, [](const VectorXd& x, int) { return two_valleys(x); }, objective.best()->x, {30}, {"a", "b"}, 1);
+            objective, [](const VectorXd& x, int) { return two_valleys(x); }, objective.best()->x, {{30}}, {"a", "b"}, 1);
     };
     const auto found = look_and_descend(objective, look, [&] {
         ++descents;
@@ -395,7 +395,7 @@ TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
     const auto found = look_and_descend(
         objective,
         [&] {
-            return look_close(objective, bowl(promised), best, {30}, {"a", "b"}, 1);
+            return look_close(objective, bowl(promised), best, {{30}}, {"a", "b"}, 1);
         },
         [] { FAIL() << "nothing is confirmed"; });
     ASSERT_TRUE(found);

@@ -2,6 +2,7 @@
 #include "inverse/fit.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -96,6 +97,113 @@ TEST(SystemUncertainty, AParameterWithoutEffectLeavesTheOthersTheirErrors) {
             EXPECT_EQ(fit.message.find("cannot be told", said + 20), std::string::npos) << fit.message;
             std::swap(both.parameters[0], both.parameters[1]);
         }
+    }
+}
+
+// Force is `slope` times the toughness of earlywood times the displacement; data with errors of `error` to either side in turn,
+// so that no neighbours go together.
+struct LinearTest {
+    static constexpr double slope = 1e3;
+
+    static Record run(const Scene& scene) {
+        Record record;
+        for (int i = 1; i <= 40; ++i) {
+            Instant instant;
+            instant.displacement = 1e-5 * i;
+            instant.force = slope * scene.materials.at("EW").toughness * instant.displacement;
+            record.series.push_back(instant);
+        }
+        return record;
+    }
+
+    static Experiment experiment(const std::string& name, double toughness, double error, double noise) {
+        Experiment experiment;
+        experiment.name = name;
+        experiment.scene.materials["EW"].toughness = toughness;
+        experiment.data = measure(run(experiment.scene), 0, 0, 1);
+        experiment.data.crack_length.clear();
+        for (std::size_t i = 0; i < experiment.data.force.size(); ++i) {
+            experiment.data.force[i] += i % 2 == 0 ? error : -error;
+        }
+        experiment.noise.force = noise;
+        return experiment;
+    }
+
+    static FitOptions options() {
+        FitOptions options;
+        options.forward = [](const Scene& scene, const std::atomic<bool>*) { return run(scene); };
+        options.cheap_runs = true;
+        return options;
+    }
+
+    // J^T J / sigma^2
+    static double information(double noise) {
+        double sum = 0;
+        for (int i = 1; i <= 40; ++i) {
+            sum += std::pow(slope * 1e-5 * i / noise, 2);
+        }
+        return sum;
+    }
+};
+
+Parameter linear_toughness() {
+    Parameter parameter = toughness_parameter("EW", 80);
+    parameter.scale = Scale::linear;
+    return parameter;
+}
+
+// What the noise does not explain widens what the data say, not the prior: (J^T J / s + P)^-1. Table, profile and posterior
+// agree: the latter's standard deviation is good to 1 / sqrt(2 x 800 independent samples), here three times that.
+TEST(VerificationUncertainty, PriorsAreNotWidened) {
+    for (const double sd : {0.5, 5.0}) {
+        for (const double error : {0.8, 4.0}) {
+            Study study;
+            study.experiments = {LinearTest::experiment("a", 110, error, 1.0)};
+            study.parameters = {linear_toughness()};
+            study.parameters[0].prior = Prior{110, sd};
+            study.uncertainty.posterior = 4000;
+            const Fit fit = fit_study(study, LinearTest::options());
+            double chi_square = 0;
+            for (const FitResidual& residual : fit.residuals) {
+                chi_square += residual.residual * residual.residual / 39;
+            }
+            EXPECT_NEAR(fit.reduced_chi_square / chi_square, 1, 1e-5);  // samples come upon runs as good as the same
+            const double expected = 1 / std::sqrt(LinearTest::information(1.0) / std::max(1.0, chi_square) + 1 / (sd * sd));
+            EXPECT_NEAR(fit.parameters[0].standard_error / expected, 1, 1e-3) << sd << " " << error;
+            double variance = 0;
+            for (const PosteriorSample& sample : fit.posterior) {
+                variance += std::pow(sample.parameters[0] - fit.parameters[0].value, 2) / 4000;
+            }
+            EXPECT_NEAR(std::sqrt(variance) / expected, 1, 0.075) << sd << " " << error;
+            study.uncertainty = {.profile = true, .posterior = 0};
+            const FittedParameter profiled = fit_study(study, LinearTest::options()).parameters[0];
+            EXPECT_NEAR((profiled.upper_95 - profiled.lower_95) / (2 * student_975(39) * expected), 1, 0.01);
+        }
+    }
+}
+
+// Weights say how much each test has to say: with J^T J = A of each, the errors of two are those of the weighted mean of what
+// each says by itself.
+TEST(VerificationUncertainty, WeightsAreNoNoise) {
+    const auto fitted = [](double first, double second, bool profile) {
+        Study study;
+        study.experiments = {LinearTest::experiment("a", 110, 0.8, 1.0), LinearTest::experiment("b", 110, 1.6, 2.0)};
+        study.experiments[0].weight = first;
+        study.experiments[1].weight = second;
+        study.parameters = {linear_toughness()};
+        study.uncertainty.profile = profile;
+        return fit_study(study, LinearTest::options());
+    };
+    const double a = LinearTest::information(1.0), b = LinearTest::information(2.0);
+    for (const double factor : {0.01, 1.0, 100.0}) {
+        const Fit fit = fitted(factor, 4 * factor, false);
+        const double expected = std::sqrt(a + 16 * b) / (a + 4 * b);
+        EXPECT_NEAR(fit.parameters[0].standard_error / expected, 1, 1e-3) << factor;
+        EXPECT_NEAR(fit.reduced_chi_square, 0.64 * 80 / 79, 1e-3) << factor;
+        EXPECT_NE(fit.message.find(fmt::format("b: noise (one sigma): force 2 N; weight {:g}.", 4 * factor)), std::string::npos)
+            << fit.message;
+        const FittedParameter profiled = fitted(factor, 4 * factor, true).parameters[0];
+        EXPECT_NEAR((profiled.upper_95 - profiled.lower_95) / (2 * student_975(79) * expected), 1, 0.01) << factor;
     }
 }
 
