@@ -183,7 +183,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const bool has_begun = by_walks && before.descend(stage);
     SearchResult found = has_begun  ? runs.descend(1, before.best(), stage)
                          : by_walks ? runs.descend(study.optimizer.starts, box.initial(), stage)
-                                    : search(objective, study.optimizer, box.initial(), options.seed, stage);
+                                    : runs.search(box.initial(), stage);
     found.method += before.method();
     objective.set_budget_left(objective.budget_left() + reserve);
 
@@ -260,7 +260,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
         fit.distances = curve_distances(fit.residuals);
         fit.message += lack_of_fit(fit.checks) + model.remarks();
-        if (by_walks) {
+        if (own) {
             fit.message +=
                 fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ",
                             100 * model.resolution());
@@ -271,9 +271,17 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     return fit;
 }
 
+namespace {
+
+// Without a fit nothing tells how much of it is needed: at equilibrium the noise is what the study says.
+double resolution_before_fit(const KeptWalks& walks) { return walks.at_equilibrium() ? 0.0 : solver_resolution; }
+
+}  // namespace
+
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
     const auto kept = std::make_shared<const Study>(study);
-    const auto model = std::make_shared<StudyModel>(*kept, KeptWalks(*kept).in_any_order(), solver_resolution, stop);
+    const KeptWalks walks(*kept);
+    const auto model = std::make_shared<StudyModel>(*kept, walks.in_any_order(), resolution_before_fit(walks), stop);
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 
@@ -282,7 +290,7 @@ std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::Vecto
     if (!walks.has_exact_slopes()) {
         return std::nullopt;
     }
-    const StudyModel near(study, walks.near({values.begin(), values.end()}), solver_resolution, stop);
+    const StudyModel near(study, walks.near({values.begin(), values.end()}), resolution_before_fit(walks), stop);
     const auto slopes = walk_slopes([&](const Eigen::VectorXd& v) { return near.at(v, 1); }, values, study.parameters);
     return slopes ? std::optional(slopes->mean()) : std::nullopt;
 }

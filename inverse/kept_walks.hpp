@@ -57,6 +57,9 @@ class KeptWalks {
     /// the crack's way.
     bool has_exact_slopes() const;
 
+    /// Whether all runs of the study are walks with other toughnesses or moduli, from equilibrium to equilibrium.
+    bool at_equilibrium() const { return only_toughness() || has_slopes(); }
+
   private:
     class Store;
     std::shared_ptr<Store> store_;

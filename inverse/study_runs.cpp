@@ -10,7 +10,8 @@
 namespace crampfit {
 namespace {
 
-constexpr int most_weighings = 4;  // by another resolution of the model
+constexpr int most_weighings = 4;     // by another resolution of the model
+constexpr double least_change = 0.1;  // of a sigma, that they are made for
 
 // All that the lowest point of a cheap model hangs on beyond what the runs do.
 std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
@@ -126,19 +127,42 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
 
 bool StudyRuns::descend_again() { return weigh_and_descend(crampfit::descend_again(objective_, nearby_, options_.seed), false); }
 
+SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage) {
+    SearchResult found = crampfit::search(objective_, study_.optimizer, initial, options_.seed, stage);
+    OptimizerChoice again = study_.optimizer;
+    again.starts = 1;
+    const bool weighs = !options_.forward && walks_.at_equilibrium();
+    for (int round = 0; weighs && objective_.best() && round < most_weighings && weigh_anew(least_change); ++round) {
+        const Eigen::VectorXd best = objective_.best()->x;
+        const SearchResult next = crampfit::search(objective_, again, best, options_.seed, stage);
+        found.converged = next.converged;
+        found.method += " Weighed anew by what the model knows, from the best run on: " + next.method;
+    }
+    return found;
+}
+
+// Weighs all runs by what the best one says of the model's resolution, where that changes a sigma by more than so much.
+bool StudyRuns::weigh_anew(double least) {
+    const double likely = model_.likely_resolution(*objective_.best()->evaluation, solver_resolution);
+    if (model_.change_of_sigma(likely) <= least) {
+        return false;
+    }
+    model_.set_resolution(likely);
+    objective_.judge_anew([&](const Run& run) {
+        Evaluation evaluation = *run.evaluation;
+        model_.weigh(evaluation, model_.box().values(run.x));
+        return evaluation;
+    });
+    return true;
+}
+
 // How well the model knows what it says shows where it fits: on to the lowest point as that weighs it.
 bool StudyRuns::weigh_and_descend(bool converged, bool ended_early) {
     for (int round = 0; converged && round < most_weighings; ++round) {
-        const double likely = model_.likely_resolution(*objective_.best()->evaluation, solver_resolution);
-        if (!(round == 0 && ended_early) && model_.change_of_sigma(likely) <= 0.1) {
+        const bool goes_on = weigh_anew(round == 0 && ended_early ? 0.0 : least_change);
+        if (!goes_on && !(round == 0 && ended_early)) {
             break;
         }
-        model_.set_resolution(likely);
-        objective_.judge_anew([&](const Run& run) {
-            Evaluation evaluation = *run.evaluation;
-            model_.weigh(evaluation, model_.box().values(run.x));
-            return evaluation;
-        });
         converged = crampfit::descend_again(objective_, nearby_, options_.seed);
     }
     return converged;

@@ -30,7 +30,11 @@ class StudyRuns {
     /// (descend_by_walks), weighed by what the residuals say of the model's resolution.
     SearchResult descend(int starts, const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
 
-    /// The same from the best run on. Whether that ended by its own criterion.
+    /// By the study's method, from `initial`. Where runs go from equilibrium to equilibrium it goes on from the best one, weighed
+    /// by what the residuals say of the model's resolution, as `descend` does; else the resolution is what it is at worst.
+    SearchResult search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
+
+    /// `descend` from the best run on. Whether that ended by its own criterion.
     bool descend_again();
 
     /// The parameters' values at a point of the unit cube [parameters], SI.
@@ -47,6 +51,7 @@ class StudyRuns {
     Forward forward() const;
     Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
+    bool weigh_anew(double least_change);
     bool weigh_and_descend(bool converged, bool ended_early);
     Evaluation run(const Eigen::VectorXd& x, int share);
     Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;

@@ -1,5 +1,6 @@
 #include "inverse/fit.hpp"
 #include "datasets/error.hpp"
+#include "datasets/io.hpp"
 #include "inverse/run_end.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
@@ -288,6 +289,74 @@ TEST(SystemFit, FlagsAParameterAtItsBound) {
         EXPECT_LE(fit.parameters[1].upper_95, 150) << method;
         EXPECT_NE(fit.message.find("'LW toughness' stands at its upper bound"), std::string::npos) << fit.message;
     }
+}
+
+// A bar under tension, F = E w t u / L, whose data are the model's and noise: nothing is left for the model not to know, by no
+// method, nor for those who drive the study themselves.
+TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
+    Study study;
+    Experiment experiment;
+    experiment.name = "bar";
+    experiment.scene = parse_scene(R"(
+[model]
+plane = "stress"
+thickness = "10 mm"
+cell = "5 mm"
+[specimen]
+size = ["10 mm", "20 mm"]
+material = "EW"
+[materials]
+EW = { kind = "isotropic", E = "400 MPa", nu = 0.0, density = "300 kg/m^3", toughness = "100 J/m^2" }
+[[edges]]
+name = "top"
+side = "top"
+velocity = ["0 m/s", "1 mm/min"]
+[[edges]]
+name = "bottom"
+side = "bottom"
+velocity = ["0 m/s", "0 m/s"]
+[measure]
+force = "top"
+displacement = "top"
+[stop]
+displacement = "0.1 mm"
+)",
+                                   "bar.toml");
+    std::mt19937 generator(1);
+    std::normal_distribution<double> normal(0.0, 2.0);
+    double information = 0;
+    for (int i = 1; i <= 40; ++i) {
+        const double u = 0.1e-3 * i / 40;
+        experiment.data.displacement.push_back(u);
+        experiment.data.force.push_back(5e-3 * 350e6 * u + normal(generator));
+        information += std::pow(5e-3 * 1e6 * u / 2.0, 2);  // of E in MPa
+    }
+    experiment.noise.force = 2.0;
+    study.experiments = {experiment};
+    Parameter parameter;
+    parameter.name = "E";
+    parameter.keys = {"materials.EW.E"};
+    parameter.initial = 400e6;
+    parameter.lower = 100e6;
+    parameter.upper = 900e6;
+    parameter.unit = "MPa";
+    parameter.unit_factor = 1e6;
+    study.parameters = {parameter};
+    FitOptions options;
+    options.threads = 1;
+    for (const char* method : {"auto", "ceres", "bobyqa", "sbplx"}) {
+        study.optimizer.method = method;
+        const Fit fit = fit_study(study, options);
+        EXPECT_EQ(fit.status, FitStatus::converged) << method;
+        EXPECT_NEAR(fit.residuals.back().sigma, 2.0, 1e-9) << method;
+        const double widened = std::sqrt(std::max(1.0, fit.reduced_chi_square));
+        EXPECT_NEAR(fit.parameters[0].standard_error * std::sqrt(information) / widened, 1, 0.02) << method;
+        EXPECT_NEAR(fit.parameters[0].value, 350, 3 / std::sqrt(information)) << method;
+    }
+    const Evaluation there = fit_function(study)(Eigen::VectorXd::Constant(1, 380e6), 1);
+    ASSERT_TRUE(there.usable());
+    const double last = experiment.data.force.back();
+    EXPECT_NEAR(there.residuals.tail(1)[0], (5e-3 * 380e6 * 0.1e-3 - last) / 2.0, 1e-6);
 }
 
 TEST(SystemFit, WeightsAndSeveralExperimentsAddUp) {
