@@ -154,10 +154,8 @@ void read_models(const Entry& entry, const Overrides& scene_overrides, Study& st
         entry.fail("only a study of experiments can compare models");
     }
     study.compared_key = entry.at("key").text();
-    for (const Parameter& parameter : study.parameters) {
-        if (std::ranges::count(parameter.keys, study.compared_key) > 0) {
-            entry.at("key").fail(fmt::format("belongs to the parameter \"{}\" already", parameter.name));
-        }
+    if (const Parameter* owner = owner_of(numbers_at(study, study.compared_key), study.parameters, study)) {
+        entry.at("key").fail(fmt::format("belongs to the parameter \"{}\" already", owner->name));
     }
     for (const Entry& value : entry.at("values").list()) {
         ModelChoice& model = study.models.emplace_back();
@@ -180,6 +178,18 @@ void read_models(const Entry& entry, const Overrides& scene_overrides, Study& st
     }
     if (study.models.size() < 2) {
         entry.at("values").fail("at least two values are needed");
+    }
+}
+
+/// A number that a parameter sets in every run has no use for a value, unless the parameter begins with it.
+void check_overrides(const Overrides& overrides, const Entry& parameters, const Study& study) {
+    for (const auto& [key, value] : overrides) {
+        const Parameter* owner = owner_of(numbers_at(study, key), study.parameters, study);
+        if (owner && parameters.list()[static_cast<std::size_t>(owner - study.parameters.data())].has("initial")) {
+            throw InputError(command_line, key, value,
+                             fmt::format("belongs to the parameter \"{0}\": give parameters.{1}.initial", owner->name,
+                                         join_key("", owner->name)));
+        }
     }
 }
 
@@ -231,6 +241,7 @@ Study read_study(const std::filesystem::path& file, const Overrides& overrides) 
         study.experiments = read_experiments(root.at("experiments"), split.scenes);
     }
     study.parameters = read_parameters(root.at("parameters"), study);
+    check_overrides(overrides, root.at("parameters"), study);
     if (const auto outputs = root.find("outputs")) {
         study.outputs = read_outputs(*outputs, study);
     }

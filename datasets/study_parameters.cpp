@@ -31,6 +31,10 @@ NumberRule find_rule(const Entry& entry, const std::string& key, const Study& st
     entry.fail(fmt::format("{} {}", key, reason));
 }
 
+bool share_one(const std::vector<const double*>& one, const std::vector<const double*>& other) {
+    return std::ranges::find_first_of(one, other) != one.end();
+}
+
 std::vector<Entry> key_entries(const Entry& parameter) {
     if (parameter.has("key") == parameter.has("keys")) {
         parameter.fail("give one of key and keys");
@@ -54,8 +58,10 @@ std::vector<NumberRule> read_keys(const Entry& entry, const Study& study, Parame
             key.fail(fmt::format("all keys of a parameter need one dimension: got {} after {}", describe(rules.back().dimension),
                                  describe(rules.front().dimension)));
         }
-        if (std::ranges::count(parameter.keys, key.text()) > 0) {
-            key.fail("is given twice");
+        for (const std::string& before : parameter.keys) {
+            if (share_one(numbers_at(study, before), numbers_at(study, key.text()))) {
+                key.fail(before == key.text() ? "is given twice" : fmt::format("is the same number as {}", before));
+            }
         }
         parameter.keys.push_back(key.text());
     }
@@ -138,27 +144,57 @@ Parameter read_parameter(const Entry& entry, const Study& study) {
     return parameter;
 }
 
-/// A name or a key that another parameter has already.
-void check_unlike(const Entry& entry, const Parameter& parameter, const std::vector<Parameter>& others) {
+/// A name or a number that another parameter has already.
+void check_unlike(const Entry& entry, const Parameter& parameter, const std::vector<Parameter>& others, const Study& study) {
     for (const Parameter& other : others) {
         if (other.name == parameter.name) {
             entry.fail(fmt::format("the name \"{}\" is taken: each parameter needs a name of its own", other.name));
         }
-        for (const std::string& key : other.keys) {
-            if (std::find(parameter.keys.begin(), parameter.keys.end(), key) != parameter.keys.end()) {
-                entry.fail(fmt::format("{} belongs to the parameter \"{}\" already", key, other.name));
-            }
+    }
+    for (const std::string& key : parameter.keys) {
+        if (const Parameter* owner = owner_of(numbers_at(study, key), others, study)) {
+            entry.fail(fmt::format("{} belongs to the parameter \"{}\" already", key, owner->name));
         }
     }
 }
 
 }  // namespace
 
+std::vector<const double*> numbers_at(const Study& study, const std::string& key) {
+    std::vector<const double*> numbers;
+    try {
+        if (const auto found = find_machine_number(study, key, "", "")) {
+            return {&(study.experiments[found->experiment].machine.*found->number->value)};
+        }
+    } catch (const InputError&) {  // none of a machine
+        return {};
+    }
+    for (const Scene* scene : scenes_of(study)) {
+        try {
+            numbers.push_back(find_number(*scene, key, "", "").value);
+        } catch (const InputError&) {  // not in this scene
+        }
+    }
+    return numbers;
+}
+
+const Parameter* owner_of(const std::vector<const double*>& numbers, const std::vector<Parameter>& parameters,
+                          const Study& study) {
+    for (const Parameter& parameter : parameters) {
+        for (const std::string& key : parameter.keys) {
+            if (share_one(numbers, numbers_at(study, key))) {
+                return &parameter;
+            }
+        }
+    }
+    return nullptr;
+}
+
 std::vector<Parameter> read_parameters(const Entry& list, const Study& study) {
     std::vector<Parameter> parameters;
     for (const Entry& entry : list.list()) {
         const Parameter parameter = read_parameter(entry, study);
-        check_unlike(entry, parameter, parameters);
+        check_unlike(entry, parameter, parameters, study);
         parameters.push_back(parameter);
     }
     if (parameters.empty()) {

@@ -4,9 +4,18 @@
 #include "datasets/keys.hpp"
 #include "datasets/toml_reader.hpp"
 
+#include <string>
 #include <vector>
 
 namespace crampfit {
+
+/// What a parameter's key leads to: a number in each scene that has it, or of an experiment's machine. Empty for a key that leads
+/// to no number. A number may have several keys (edges.top and edges.0), which lead to the same place.
+std::vector<const double*> numbers_at(const Study& study, const std::string& key);
+
+/// The parameter with a number among these, if any.
+const Parameter* owner_of(const std::vector<const double*>& numbers, const std::vector<Parameter>& parameters,
+                          const Study& study);
 
 /// The [[parameters]] of a study; each key must be a number of one of its scenes or of an experiment's machine. `initial` may be
 /// left out where the study stands on a scene alone, and is the scene's value then. Throws InputError.

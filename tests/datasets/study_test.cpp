@@ -4,6 +4,7 @@
 #include "tests/datasets/good_scenes.hpp"
 #include "tests/temporary_folder.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 using namespace crampfit;
@@ -152,11 +153,12 @@ TEST(UnitStudy, MachinesAndFixedRatios) {
     std::string text = good_study + offset;
     text.replace(text.find("weight = 2.0"), 12, "compliance = \"0.5 um/N\"\nforce_offset = \"-20 mN\"");
     text.replace(text.find("initial = \"50 MPa\""), 0, "factors = [1, 12.5]\n");
-    const Study study = folder.read(text, {{"experiments.wedge 1.displacement_offset", "10 um"}});
+    text.replace(text.find("compliance = "), 0, "displacement_offset = \"3 um\"\n");
+    const Study study = folder.read(text, {{"experiments.wedge 1.compliance", "0.6 um/N"}});
     const Machine& machine = study.experiments[0].machine;
-    EXPECT_DOUBLE_EQ(machine.compliance, 0.5e-6);
+    EXPECT_DOUBLE_EQ(machine.compliance, 0.6e-6);
     EXPECT_DOUBLE_EQ(machine.force_offset, -0.02);
-    EXPECT_DOUBLE_EQ(machine.displacement_offset, 10e-6);
+    EXPECT_DOUBLE_EQ(machine.displacement_offset, 3e-6);
     EXPECT_EQ(study.experiments[1].machine.compliance, 0);
     EXPECT_EQ(study.parameters[1].factor(0), 1);
     EXPECT_EQ(study.parameters[1].factor(1), 12.5);
@@ -338,6 +340,34 @@ TEST(UnitStudy, OneKeyInTwoParameters) {
                               "lower = \"1 MPa\"\nupper = \"3 MPa\"\n";
     expect_error((folder / "study.toml").string(), "parameters.again", "belongs to the parameter \"stiffness\" already",
                  [&] { folder.read(good_study + twice); });
+}
+
+TEST(UnitStudy, OneNumberByTwoKeys) {
+    const StudyFolder folder;
+    const auto parameter = [](const std::string& name, const std::string& keys, const std::string& unit) {
+        return fmt::format("\n[[parameters]]\nname = \"{0}\"\n{1}\ninitial = \"0 {2}\"\nlower = \"-1 {2}\"\nupper = \"1 {2}\"\n",
+                           name, keys, unit);
+    };
+    const std::string file = (folder / "study.toml").string();
+    const std::string by_name = parameter("zero", "key = \"experiments.wedge 1.force_offset\"", "N");
+    const std::string by_number = parameter("again", "key = \"experiments.0.force_offset\"", "N");
+    const std::string grip = parameter("grip", "key = \"edges.grip.velocity.1\"", "m/s");
+    const std::string belongs = "belongs to the parameter \"";
+    expect_error(file, "parameters.again", belongs + "zero\"", [&] { folder.read(good_study + by_name + by_number); });
+    expect_error(file, "parameters.again", belongs + "grip\"",
+                 [&] { folder.read(good_study + grip + parameter("again", "key = \"edges.0.velocity.1\"", "m/s")); });
+    expect_error(file, "parameters.both.keys.1", "is the same number as edges.grip.velocity.1", [&] {
+        folder.read(good_study + parameter("both", "keys = [\"edges.grip.velocity.1\", \"edges.0.velocity.1\"]", "m/s"));
+    });
+    expect_error(file, "compare.key", belongs + "grip\"", [&] {
+        folder.read(good_study + grip + "[compare]\nkey = \"edges.0.velocity.1\"\nvalues = [\"1 m/s\", \"2 m/s\"]\n");
+    });
+    expect_error("command line (--set)", "materials.EW.E", belongs + "stiffness\": give parameters.stiffness.initial", [&] {
+        folder.read(good_study, {{"materials.EW.E", "3 MPa"}});
+    });
+    expect_error("command line (--set)", "experiments.0.force_offset", belongs + "zero\"", [&] {
+        folder.read(good_study + by_name, {{"experiments.0.force_offset", "1 N"}});
+    });
 }
 
 TEST(UnitStudy, ErrorsOfItsFilesNameThoseFiles) {
