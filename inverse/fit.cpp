@@ -279,6 +279,7 @@ double resolution_before_fit(const KeptWalks& walks) { return walks.at_equilibri
 }  // namespace
 
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
+    check_one_model(study);
     const auto kept = std::make_shared<const Study>(study);
     const KeptWalks walks(*kept);
     const auto model = std::make_shared<StudyModel>(*kept, walks.in_any_order(), resolution_before_fit(walks), stop);

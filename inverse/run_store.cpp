@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
 #include "datasets/machine.hpp"
+#include "inverse/scene_runs.hpp"
 
 #include <fmt/format.h>
 
@@ -126,8 +127,8 @@ RunStore::RunStore(const RunKeeping& keeping, const Study& study, const std::ato
         if (run.status == search_status) {
             const auto n = static_cast<std::size_t>(run.parameters[0]);
             searches_[n] = {std::bit_cast<std::uint64_t>(run.parameters[1]), run.results};
-        } else {
-            known_.emplace(run.parameters, evaluation_of(run));
+        } else if (!had_less_time(run.status, study.time_limit)) {
+            known_.insert_or_assign(run.parameters, evaluation_of(run));
         }
     }
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <deque>
 #include <future>
 #include <mutex>
@@ -16,6 +17,8 @@
 
 namespace crampfit {
 namespace {
+
+constexpr const char* out_of_time = "longer than runs.time_limit = ";
 
 bool finite(const Record& record) {
     return std::all_of(record.series.begin(), record.series.end(), [](const Instant& instant) {
@@ -51,6 +54,18 @@ class TimeLimit {
 };
 
 }  // namespace
+
+bool had_less_time(const std::string& status, std::optional<double> limit) {
+    constexpr double written = 1e-5;  // part of it that the digits leave open
+    const std::string words = out_of_time;
+    for (std::size_t at = status.find(words); at != std::string::npos; at = status.find(words, at + 1)) {
+        const double had = std::strtod(status.c_str() + at + words.size(), nullptr);
+        if (!limit || *limit > had * (1 + written)) {
+            return true;
+        }
+    }
+    return false;
+}
 
 /// The last records of each scene, by the numbers that were set in it; those that are on their way too.
 struct SceneRuns::Kept {
@@ -163,7 +178,7 @@ SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const std::vector<do
         } else if (!finite(record)) {
             outcome.status += ": the run gave numbers that are not finite";
         } else if (!ended) {
-            outcome.status += limit.passed()           ? fmt::format(": longer than runs.time_limit = {:g} s", *time_limit_)
+            outcome.status += limit.passed()           ? fmt::format(": {}{:g} s", out_of_time, *time_limit_)
                               : record.message.empty() ? ""
                                                        : ": " + record.message;
         } else {

@@ -13,6 +13,9 @@
 
 namespace crampfit {
 
+/// Whether a run that went like this was ended by a time limit [s] below this one; absent: there is none now.
+bool had_less_time(const std::string& status, std::optional<double> limit);
+
 /// The scenes of a study, made ready to be run with any values of its parameters. A scene is not run again where nothing changes
 /// but the machine that it is tested on, or another scene: the last records of each are kept.
 class SceneRuns {

@@ -58,7 +58,12 @@ std::vector<double> values_of(const Evaluations& evaluations, std::size_t output
 
 std::vector<Estimate> scaled(std::vector<Estimate> estimates, const std::vector<double>& factors) {
     for (std::size_t j = 0; j < estimates.size(); ++j) {
-        estimates[j] = {estimates[j].value * factors[j], estimates[j].lower_95 * factors[j], estimates[j].upper_95 * factors[j]};
+        for (double* number : {&estimates[j].value, &estimates[j].lower_95, &estimates[j].upper_95}) {
+            *number *= factors[j];
+            if (std::isnan(*number)) {
+                *number = std::numeric_limits<double>::quiet_NaN();  // 0 / 0 has a sign on some machines
+            }
+        }
     }
     return estimates;
 }
@@ -271,8 +276,11 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     apply_method(study, model.box(), objective, slopes, options.seed, result);
     fill_runs(model.box(), objective.runs(), result);
     conclude(objective.runs(), objective.stopped(), result);
-    if (slopes && !result.indices.empty()) {
+    if (slopes && !result.indices.empty() && study.sensitivity.method == SensitivityMethod::local) {
         result.message += "; derivatives are exact, by the solver";
+    }
+    if (std::ranges::any_of(study.parameters, [](const Parameter& parameter) { return parameter.prior.has_value(); })) {
+        result.message += "; priors do not count, parameters go evenly over their box";
     }
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return result;

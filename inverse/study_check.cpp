@@ -68,7 +68,13 @@ void check_study(const Study& study) {
             "must not be negative");
 }
 
+void check_one_model(const Study& study) {
+    require(study.models.empty(), study, "compare", study.compared_key,
+            "only a fit compares models: leave it out, and give the key's value in the scene or by --set");
+}
+
 void check_sensitivity_study(const Study& study) {
+    check_one_model(study);
     require(!scenes_of(study).empty(), study, "scene", "none", "a sensitivity study needs a scene, or experiments with scenes");
     require(!study.outputs.empty(), study, "outputs", "none", "a sensitivity study needs outputs to look at");
     require(!study.parameters.empty(), study, "parameters", "none", "a sensitivity study needs a parameter to vary");

@@ -1,7 +1,7 @@
 #include "inverse/fit.hpp"
 #include "datasets/error.hpp"
-#include "datasets/io.hpp"
 #include "inverse/run_end.hpp"
+#include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -297,31 +297,7 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
     Study study;
     Experiment experiment;
     experiment.name = "bar";
-    experiment.scene = parse_scene(R"(
-[model]
-plane = "stress"
-thickness = "10 mm"
-cell = "5 mm"
-[specimen]
-size = ["10 mm", "20 mm"]
-material = "EW"
-[materials]
-EW = { kind = "isotropic", E = "400 MPa", nu = 0.0, density = "300 kg/m^3", toughness = "100 J/m^2" }
-[[edges]]
-name = "top"
-side = "top"
-velocity = ["0 m/s", "1 mm/min"]
-[[edges]]
-name = "bottom"
-side = "bottom"
-velocity = ["0 m/s", "0 m/s"]
-[measure]
-force = "top"
-displacement = "top"
-[stop]
-displacement = "0.1 mm"
-)",
-                                   "bar.toml");
+    experiment.scene = bar_scene();
     std::mt19937 generator(1);
     std::normal_distribution<double> normal(0.0, 2.0);
     double information = 0;

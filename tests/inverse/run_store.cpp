@@ -291,5 +291,44 @@ TEST(SystemResume, RunsThatHangAreStoppedAndRecorded) {
         << failure;
 }
 
+TEST(SystemResume, RunsThatHadTooLittleTimeAreMadeAgainWithMore) {
+    const TemporaryFolder folder;
+    Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    study.optimizer = {.method = "sbplx", .max_runs = 6};
+    study.time_limit = 0.02;
+    int runs = 0;
+    FitOptions options;
+    options.threads = 1;
+    options.keeping = {folder / "fit.runs", false};
+    options.forward = [&runs](const Scene& scene, const std::atomic<bool>* stop) {
+        const auto begin = std::chrono::steady_clock::now();
+        Record record = FakeWedge{}(scene);
+        while (std::chrono::steady_clock::now() - begin < std::chrono::milliseconds(80)) {
+            if (stop && *stop) {
+                record.status = RunStatus::interrupted;
+                break;
+            }
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        ++runs;
+        return record;
+    };
+    EXPECT_EQ(fit_study(study, options).status, FitStatus::failed);
+    options.keeping.resume = true;
+    struct Call {
+        std::optional<double> limit;
+        bool runs_again, fails;
+    };
+    const double little = 0.02, enough = 60.0;
+    for (const Call& call :
+         {Call{little, false, true}, Call{enough, true, false}, Call{little, false, false}, Call{{}, false, false}}) {
+        runs = 0;
+        study.time_limit = call.limit;
+        const Fit fit = fit_study(study, options);
+        EXPECT_EQ(runs > 0, call.runs_again) << call.limit.value_or(0);
+        EXPECT_EQ(fit.status == FitStatus::failed, call.fails) << call.limit.value_or(0);
+    }
+}
+
 }  // namespace
 }  // namespace crampfit::testing

@@ -5,6 +5,7 @@
 #include "inverse/outputs.hpp"
 #include "inverse/saltelli.hpp"
 #include "inverse/sobol_points.hpp"
+#include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -323,6 +324,41 @@ TEST(UnitSensitivity, RefusesStudiesWithNothingToLookAt) {
     study = output_study(SensitivityMethod::local, 0);
     study.scene.reset();
     expect_refused(study, "scene");
+}
+
+TEST(SystemSensitivity, SaysWhatItsNumbersRestOnAndRefusesWhatDoesNotCount) {
+    Study study;
+    study.scene = bar_scene();
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force}, {"crack", StudyOutput::Kind::crack_length_at, 0.05e-3}};
+    Parameter modulus;
+    modulus.name = "E";
+    modulus.keys = {"materials.EW.E"};
+    modulus.initial = 400e6;
+    modulus.lower = 100e6;
+    modulus.upper = 900e6;
+    study.parameters = {modulus};
+    SensitivityOptions options;
+    options.threads = 1;
+    const Sensitivity local = study_sensitivity(study, options);
+    EXPECT_NE(local.message.find("derivatives are exact"), std::string::npos) << local.message;
+    EXPECT_EQ(local.message.find("priors"), std::string::npos) << local.message;
+    int undefined = 0;
+    for (const SensitivityIndex& index : local.indices) {
+        if (std::isnan(index.value)) {  // the elasticity of no crack at all: 0 / 0
+            ++undefined;
+            EXPECT_FALSE(std::signbit(index.value));
+        }
+    }
+    EXPECT_EQ(undefined, 1);
+    study.sensitivity = {SensitivityMethod::sobol, 4};
+    study.parameters[0].prior = Prior{400e6, 1e6};
+    const Sensitivity sobol = study_sensitivity(study, options);
+    EXPECT_EQ(sobol.message.find("derivatives"), std::string::npos) << sobol.message;
+    EXPECT_NE(sobol.message.find("priors do not count"), std::string::npos) << sobol.message;
+    study.compared_key = "model.plane";
+    study.models.resize(2);
+    EXPECT_THROW(study_sensitivity(study, options), InputError);
+    EXPECT_THROW(fit_function(study), InputError);
 }
 
 }  // namespace

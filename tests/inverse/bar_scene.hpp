@@ -1,0 +1,36 @@
+#pragma once
+
+#include "datasets/io.hpp"
+
+namespace crampfit::testing {
+
+/// A bar under tension, F = E w t u / L with w = t = 10 mm and L = 20 mm.
+inline Scene bar_scene() {
+    return parse_scene(R"(
+[model]
+plane = "stress"
+thickness = "10 mm"
+cell = "5 mm"
+[specimen]
+size = ["10 mm", "20 mm"]
+material = "EW"
+[materials]
+EW = { kind = "isotropic", E = "400 MPa", nu = 0.0, density = "300 kg/m^3", toughness = "100 J/m^2" }
+[[edges]]
+name = "top"
+side = "top"
+velocity = ["0 m/s", "1 mm/min"]
+[[edges]]
+name = "bottom"
+side = "bottom"
+velocity = ["0 m/s", "0 m/s"]
+[measure]
+force = "top"
+displacement = "top"
+[stop]
+displacement = "0.1 mm"
+)",
+                       "bar.toml");
+}
+
+}  // namespace crampfit::testing
