@@ -55,7 +55,8 @@ class Undetermined {
     Undetermined(const std::vector<std::string>& names, const Window& window)
         : names_(names), window_(window), is_member_(names.size(), false) {}
 
-    void add(const Eigen::VectorXd& of_window) {
+    // Returns how far that goes in the box, at the most of its parameters.
+    double add(const Eigen::VectorXd& of_window) {
         const Eigen::VectorXd direction = window_.axes * of_window;
         std::vector<std::string> members;
         for (std::size_t j = 0; j < names_.size(); ++j) {
@@ -70,6 +71,7 @@ class Undetermined {
         if (message_.find(sentence) == std::string::npos) {  // several directions may be made of the same parameters
             message_ += sentence;
         }
+        return direction.cwiseAbs().maxCoeff();
     }
 
     bool contains(Eigen::Index j) const { return is_member_[static_cast<std::size_t>(j)]; }
@@ -107,8 +109,8 @@ Knowledge knowledge(const Directions& directions, const Eigen::VectorXd& weights
         if (directions.resolved(k) && 4 * largest < std::sqrt(precision)) {
             told.push_back(k);
         } else {
-            known.covariance += direction * direction.transpose() / (12 * largest * largest);
-            undetermined.add(direction);
+            const double width = std::max(largest, undetermined.add(direction));  // no wider than the box
+            known.covariance += direction * direction.transpose() / (12 * width * width);
         }
     }
     if (!told.empty()) {

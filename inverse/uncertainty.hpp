@@ -51,8 +51,8 @@ struct Uncertainty {
 ///  V = how far the model's own scatter, run by run, moves the best point, and how far the best run is from the lowest
 ///  point of the polynomial: noise, or a search that ended early.
 /// A direction in which the window has less than two standard errors either side of its middle is undetermined: it gets
-/// the variance of a uniform distribution over the window, and the parameters that it is made of get the whole box as
-/// their interval.
+/// the variance of a uniform distribution over the window, or the box where that is less, and the parameters that it is made of
+/// get the whole box as their interval.
 Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& curves, const std::vector<std::string>& names,
                                  double step, const Window& window);
 

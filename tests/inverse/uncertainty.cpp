@@ -90,6 +90,7 @@ TEST(SystemUncertainty, AParameterWithoutEffectLeavesTheOthersTheirErrors) {
             const FittedParameter &told = fit.parameters[at], &untold = fit.parameters[1 - at];
             EXPECT_NEAR(told.standard_error / one.standard_error, 1, 0.015) << method;
             EXPECT_NEAR((told.upper_95 - told.lower_95) / (one.upper_95 - one.lower_95), 1, 0.015) << method;
+            EXPECT_LE(untold.standard_error, 1.001 * untold.value * std::log(400.0 / 20.0) / std::sqrt(12.0)) << method;
             EXPECT_NEAR(untold.lower_95, 20, 1e-9) << method;
             EXPECT_NEAR(untold.upper_95, 400, 1e-9) << method;
             const auto said = fit.message.find("'LW toughness' cannot be told from this data");
