@@ -147,7 +147,7 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
         return {data, ""};
     }
     CoveredData covered{data, fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} "
-                                          "on are left out.",
+                                          "on are left out; a later stop would take them in.",
                                           test.name, end.key, stop_text, units * last, unit, units * beyond, unit)};
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (abscissa[i] >= beyond) {
