@@ -5,6 +5,7 @@
 #include "forward/bridging_check.hpp"
 #include "forward/contact.hpp"
 #include "forward/history.hpp"
+#include "forward/loading.hpp"
 #include "forward/march.hpp"
 #include "forward/memory_check.hpp"
 
@@ -181,90 +182,6 @@ double highest_frequency_squared(const Discretisation& body) {
 
 std::string name_of(ShapeFunction kind) {
     return kind == ShapeFunction::linear ? "linear" : kind == ShapeFunction::cpdi ? "CPDI" : "GIMP";
-}
-
-double speed_of(const Edge& edge) { return std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)); }
-double speed_of(const Body& body) { return body.velocity.norm(); }
-
-// When the run ends at the latest, by the stop conditions on time and on a displacement that is prescribed [s].
-double end_time(const Scene& scene) {
-    double end = scene.stop.time.value_or(std::numeric_limits<double>::infinity());
-    const auto consider = [&](const auto& driver) {
-        if (driver.name == scene.measure.displacement && scene.stop.displacement && speed_of(driver) > 0.0)
-            end = std::min(end, *scene.stop.displacement / speed_of(driver));
-    };
-    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
-    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
-    return end;
-}
-
-// The farthest that any edge or body goes until then [m]; infinite where nothing bounds it.
-double farthest_motion(const Scene& scene, double end) {
-    double farthest = 0.0;
-    const auto consider = [&](const auto& driver) {
-        if (speed_of(driver) > 0.0) farthest = std::max(farthest, speed_of(driver) * std::min(end, driver.until.value_or(end)));
-    };
-    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
-    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
-    for (const Part& part : scene.specimen.parts)
-        if (!part.velocity.isZero(0.0)) farthest = std::max(farthest, part.velocity.norm() * end);
-    return farthest;
-}
-
-// Whether some stop condition is met in the end, whatever the wood does.
-bool may_end(const Scene& scene) {
-    if (scene.stop.time) return true;
-    const auto gets_there = [&](const auto& driver) {
-        if (driver.name != scene.measure.displacement || !scene.stop.displacement) return false;
-        const double way = driver.until ? speed_of(driver) * *driver.until : std::numeric_limits<double>::infinity();
-        return speed_of(driver) > 0.0 && way >= *scene.stop.displacement * (1.0 - 1e-9);
-    };
-    const auto is_pulled = [&](const Edge& edge) {
-        return edge.traction && edge.name == scene.measure.displacement && scene.stop.displacement;
-    };
-    const auto follows = [&](const Body& body) {
-        return (body.free[0] || body.free[1]) && body.name == scene.measure.displacement && scene.stop.displacement;
-    };
-    const bool grows = std::ranges::any_of(scene.cracks, [](const Crack& crack) { return crack.grows != Growth::none; });
-    return (grows && scene.stop.crack_length) || std::ranges::any_of(scene.edges, gets_there) ||
-           std::ranges::any_of(scene.bodies, gets_there) || std::ranges::any_of(scene.edges, is_pulled) ||
-           std::ranges::any_of(scene.bodies, follows);
-}
-
-// How far the edges of a strip go until a long crack runs through it, G = E eps^2 h (REFERENCES: strip) with the toughest wood's
-// toughness and the softest wood's stiffness, and half as far again for arrests.
-double splitting_motion(const Scene& scene, const Discretisation& body) {
-    double toughest = 0.0;
-    double softest = std::numeric_limits<double>::infinity();
-    for (const auto& [name, wood] : scene.materials) toughest = std::max(toughest, wood.toughness);
-    for (int p = 0; p < body.points.count(); ++p) softest = std::min(softest, body.points.stiffest(p));
-    const double half_height = 0.5 * scene.specimen.size.minCoeff();
-    return 1.5 * 2.0 * half_height * std::sqrt(toughest / (softest * half_height));
-}
-
-// What moves, how fast, until when.
-struct Travel {
-    double fastest = 0.0;                                    // [m/s]
-    double until = std::numeric_limits<double>::infinity();  // all stand still from then on [s]
-    bool together = true;                                    // until the same time
-};
-
-Travel travel_of(const Scene& scene) {
-    Travel travel;
-    double last = 0.0;
-    double first = std::numeric_limits<double>::infinity();
-    const auto consider = [&](const auto& driver) {
-        if (speed_of(driver) == 0.0) return;
-        travel.fastest = std::max(travel.fastest, speed_of(driver));
-        const double until = driver.until.value_or(std::numeric_limits<double>::infinity());
-        first = std::min(first, until);
-        last = std::max(last, until);
-    };
-    std::for_each(scene.edges.begin(), scene.edges.end(), consider);
-    std::for_each(scene.bodies.begin(), scene.bodies.end(), consider);
-    if (travel.fastest > 0.0) travel.until = last;
-    travel.together = travel.fastest == 0.0 || first == last;
-    return travel;
 }
 
 // FMPM takes w to mu w + (mu / A) a dt with mu = 1 - (1 - A)^m: with squared frequency f it is stable up to dt^2 f = 2 (1 + mu) A

@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "datasets/machine.hpp"
+#include "forward/loading.hpp"
 
 #include <fmt/format.h>
 
@@ -17,28 +18,6 @@ namespace {
 constexpr double rounding = 1e-9;  // of where a run ends
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
-/// How what is measured as displacement moves.
-struct Drive {
-    double speed = 0;  // [m/s]
-    double until = unbounded;
-};
-
-// Absent where it moves by a force.
-std::optional<Drive> drive_of(const Scene& scene) {
-    for (const Edge& edge : scene.edges) {
-        const double speed = std::hypot(edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0));
-        if (edge.name == scene.measure.displacement && speed > 0) {
-            return Drive{speed, edge.until.value_or(unbounded)};
-        }
-    }
-    for (const Body& body : scene.bodies) {
-        if (body.name == scene.measure.displacement && body.velocity.norm() > 0 && !body.free[0] && !body.free[1]) {
-            return Drive{body.velocity.norm(), body.until.value_or(unbounded)};
-        }
-    }
-    return std::nullopt;
-}
-
 /// Where runs end at the latest, and by which key of the scene.
 struct RunEnd {
     double at = unbounded;  // of the specimen [m], or [s]
@@ -53,12 +32,12 @@ struct RunEnd {
 };
 
 RunEnd end_of_runs(const Scene& scene, bool by_time) {
-    const std::optional<Drive> drive = drive_of(scene);
+    const std::optional<Drive> drive = measured_drive(scene);
     RunEnd end;
     if (scene.stop.displacement && !by_time) {
         end.take(*scene.stop.displacement, "stop.displacement");
     }
-    if (scene.stop.displacement && by_time && drive && *scene.stop.displacement <= drive->speed * drive->until) {
+    if (scene.stop.displacement && by_time && drive && drive->comes_to(*scene.stop.displacement)) {
         end.take(*scene.stop.displacement / drive->speed, "stop.displacement");
     }
     if (scene.stop.time && by_time) {

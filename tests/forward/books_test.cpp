@@ -217,6 +217,36 @@ TEST(UnitPlan, RunsThatNeverEndAreRefused) {
     EXPECT_THROW(simulate(scene), InputError);
 }
 
+// An edge that stops on the way to the displacement at which the run would end: time ends it.
+TEST(UnitPlan, AnEdgeThatStopsEndsNoRunByItsDisplacement) {
+    Scene scene = bar(10e-3, 0.5e-3);
+    scene.edges = {moving("right", Side::right, {0.05, 0.0}), moving("left", Side::left, {0.0, 0.0})};
+    scene.edges[0].until = 1e-3;
+    scene.measure = {"right", "right"};
+    scene.stop.displacement = 0.1e-3;
+    scene.stop.time = 3e-3;
+    for (const SolverKind kind : {SolverKind::quasistatic, SolverKind::explicit_dynamics}) {
+        scene.solver.kind = kind;
+        const Instant last = simulate(scene).series.back();
+        EXPECT_NEAR(last.time, 3e-3, 1e-6);
+        EXPECT_NEAR(last.displacement, 0.05e-3, 1e-12);
+    }
+}
+
+// A cantilever that a traction bends far: small strain, which nothing prescribed speaks against, is told of; finite rotation is
+// not.
+TEST(UnitRecord, SaysThatWoodHasTurnedFarForSmallStrain) {
+    Scene scene = bar(20e-3, 0.5e-3);
+    Edge end = pulled("right", Side::right, {0.0, 20e3});
+    scene.edges = {moving("left", Side::left, {0.0, 0.0}), end};
+    scene.measure = {"left", "right"};
+    scene.stop.time = 5e-3;
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    EXPECT_NE(simulate(scene).message.find("a tenth of the wood has turned"), std::string::npos);
+    scene.solver.strain = StrainMeasure::finite_rotation;
+    EXPECT_EQ(simulate(scene).message.find("turned"), std::string::npos);
+}
+
 // At equilibrium: the work of an edge that stops is what the specimen keeps.
 TEST(VerificationBooks, AnEdgeThatStopsHasDoneItsWork) {
     Scene scene = at_rest({10e-3, 12e-3}, 0.5e-3);

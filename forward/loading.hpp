@@ -1,0 +1,44 @@
+#pragma once
+
+#include "forward/discretisation.hpp"
+
+#include <limits>
+#include <optional>
+
+namespace crampfit {
+
+/// How what is measured as displacement is driven.
+struct Drive {
+    double speed = 0;  // [m/s]
+    double until = 0;  // then it holds still [s]; infinite: never
+
+    bool comes_to(double displacement) const { return displacement <= speed * until * (1.0 + 1e-9); }
+};
+
+/// Absent where it stands, or moves by a force alone.
+std::optional<Drive> measured_drive(const Scene& scene);
+
+/// When the run ends at the latest, by the stop conditions on time and on a displacement that is prescribed [s]; infinite:
+/// neither ends it.
+double end_time(const Scene& scene);
+
+/// Whether some stop condition may be met in the end.
+bool may_end(const Scene& scene);
+
+/// The farthest that any edge or body goes until then [m]; infinite where nothing bounds it.
+double farthest_motion(const Scene& scene, double end);
+
+/// How far the edges of a strip go until a long crack runs through it, G = E eps^2 h (REFERENCES: strip) with the toughest wood's
+/// toughness and the softest wood's stiffness, and half as far again for arrests [m].
+double splitting_motion(const Scene& scene, const Discretisation& body);
+
+/// What moves, how fast, until when.
+struct Travel {
+    double fastest = 0.0;                                    // [m/s]
+    double until = std::numeric_limits<double>::infinity();  // all stand still from then on [s]
+    bool together = true;                                    // until the same time
+};
+
+Travel travel_of(const Scene& scene);
+
+}  // namespace crampfit
