@@ -13,8 +13,8 @@ namespace crampfit {
 namespace {
 
 constexpr int most_steps_between_searches = 50;
-constexpr double search_margin = 2.0;          // in cells
-constexpr double least_part_of_margin = 0.25;  // that anything may go between two searches
+constexpr double search_margin = 2.0;    // in cells
+constexpr double part_of_margin = 0.25;  // that anything may go between two searches
 
 // Stiffness of a facet over that of one cell of its wood, where the time step allows it: in earlywood it does, as latewood sets
 // the time step. Contact then gives way by a tenth of a cell's yield and hardly depends on the grid.
@@ -143,7 +143,7 @@ void SlidingBody::find_holds() {
 }
 
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
-    searches_each_step_ = false;
+    search_ = SearchInterval(most_steps_between_searches);
     const Points& points = body_.points;
     const int nodes = body_.layout.nodes_per_cell();
     // What a facet adds to the stiffness of a node, at most: its row of the facet's tangent, signs aside.
@@ -176,6 +176,9 @@ Vec2 SlidingBody::current(int facet, const std::vector<Vec2>& displacement) cons
     return x;
 }
 
+// Between two searches [m].
+double SlidingBody::may_go() const { return part_of_margin * search_margin * body_.layout.cell.minCoeff(); }
+
 void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displacement) {
     constexpr double hair = 1e-9;
     const Box box = bounds(shape_);
@@ -187,16 +190,11 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
     const Box at_rest{wide.low - reach, wide.high + reach};
     const std::vector<int> before = std::exchange(near_, {});
     bool torn_anew = false;
-    const bool some_only = !searches_each_step_;  // then friction has not followed the others
-    // As many steps to the next search as keep the way within the margin, going on as since the last.
-    const double way = (moved - searched_at_).norm() + std::abs(std::sqrt(farthest) - farthest_at_search_);
-    const double most = least_part_of_margin * margin.minCoeff();
-    steps_to_search_ =
-        std::min({2 * steps_since_search_ + 1, most_steps_between_searches,
-                  way > 0.0 ? std::max(1, static_cast<int>(steps_since_search_ * most / way)) : most_steps_between_searches});
-    steps_since_search_ = 0;
+    const bool some_only = !search_.searches_each_step();  // then friction has not followed the others
+    farthest = std::sqrt(farthest);
+    search_.has_searched((moved - searched_at_).norm() + std::abs(farthest - farthest_at_search_), may_go());
     searched_at_ = moved;
-    farthest_at_search_ = std::sqrt(farthest);
+    farthest_at_search_ = farthest;
     for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
         if (!at_rest.contains(body_.facets[i].position)) continue;
         const Vec2 x = current(i, displacement);
@@ -244,7 +242,7 @@ void SlidingBody::settle(const Vec2& moved, const std::vector<Vec2>& displacemen
     grips_.clear();
     for (const Touch& touch : pushed_) grips_.push_back({touch.facet, touch.drag.stretch});
     const auto keep = [&](int i) { place_[i] = current(i, displacement) - moved; };
-    if (!searches_each_step_) std::for_each(near_.begin(), near_.end(), keep);
+    if (!search_.searches_each_step()) std::for_each(near_.begin(), near_.end(), keep);
     else
         for (int i = 0; i < static_cast<int>(place_.size()); ++i) keep(i);
 }
@@ -335,9 +333,7 @@ void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement)
 }
 
 std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const std::vector<Vec2>& displacement) {
-    const double most = least_part_of_margin * search_margin * body_.layout.cell.minCoeff();
-    if (searches_each_step_ || ++steps_since_search_ >= steps_to_search_ || (moved - searched_at_).norm() > most)
-        find_near(moved, displacement);
+    if (search_.is_due() || (moved - searched_at_).norm() > may_go()) find_near(moved, displacement);
     const double onset = onset_in_cells * body_.layout.cell.minCoeff();
     if (yield_) sink(moved, displacement);
     std::vector<Touch> found;

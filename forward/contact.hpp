@@ -2,6 +2,7 @@
 
 #include "forward/discretisation.hpp"
 #include "forward/friction.hpp"
+#include "forward/search_interval.hpp"
 
 #include <array>
 #include <memory>
@@ -77,6 +78,7 @@ class SlidingBody {
     double deepest(const std::vector<Vec2>& displacement) const;
 
   private:
+    double may_go() const;
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
     double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
@@ -94,9 +96,7 @@ class SlidingBody {
     std::vector<int> first_hold_;    // [facets + 1]
     std::vector<double> stiffness_;  // [facets] [N/m]
     std::vector<int> near_;          // facets that the body may touch before the list is made anew
-    bool searches_each_step_ = true;
-    int steps_since_search_ = 0;
-    int steps_to_search_ = 1;
+    SearchInterval search_{1};
     Vec2 searched_at_ = Vec2::Zero();  // where the body had moved to at the last search [m]
     double farthest_at_search_ = 0.0;  // that anything of the specimen had gone then [m]
     double stored_energy_ = 0.0;

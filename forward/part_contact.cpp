@@ -19,7 +19,7 @@ constexpr double stiffness_in_cells = 10.0;
 }  // namespace
 
 PartContact::PartContact(const Discretisation& body, const std::vector<double>& mass, double most_frequency_squared)
-    : body_(body) {
+    : body_(body), search_(most_steps_between_searches) {
     const double h = body.layout.cell.minCoeff();
     for (const Facet& f : body.facets) {
         Segment segment;
@@ -171,16 +171,14 @@ void PartContact::touch(Candidate& candidate, std::vector<Vec2>& force) {
 
 void PartContact::push(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
     stored_energy_ = 0.0;
-    if (++steps_since_search_ >= steps_to_search_) {
+    if (search_.is_due()) {
         double way = 0.0;  // that any facet has gone since the last search [m]
         for (int i = 0; i < static_cast<int>(segments_.size()); ++i) {
             move(i, displacement);
             way = std::max(way, (segments_[i].end[0] - segments_[i].at_search).norm());
             segments_[i].at_search = segments_[i].end[0];
         }
-        const double steps = part_of_margin * search_margin * body_.layout.cell.minCoeff() / way * steps_since_search_;
-        steps_to_search_ = static_cast<int>(std::clamp(steps, 1.0, double{most_steps_between_searches}));
-        steps_since_search_ = 0;
+        search_.has_searched(way, part_of_margin * search_margin * body_.layout.cell.minCoeff());
         find_candidates();
     } else {
         for (const int i : near_) move(i, displacement);

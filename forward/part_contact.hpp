@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/discretisation.hpp"
+#include "forward/search_interval.hpp"
 
 #include <vector>
 
@@ -49,8 +50,7 @@ class PartContact {
     std::vector<Box> box_;           // [parts]
     std::vector<int> near_;          // facets in another part's box, or nearly
     std::vector<Candidate> candidates_;
-    int steps_since_search_ = 0;
-    int steps_to_search_ = 1;
+    SearchInterval search_;
     double stored_energy_ = 0.0;
 };
 
