@@ -60,7 +60,8 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
     for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
     least_force_ = least_strain * stiffest * body.layout.cell.maxCoeff() * body.layout.thickness;
     find_free_bodies();
-    if (!cracks_.lines.empty()) find_pieces(true);
+    const auto goes_through = [](const CrackLine& line) { return !line.start.inside && !line.end.inside; };
+    if (!cracks_.lines.empty()) find_pieces(std::ranges::any_of(cracks_.lines, goes_through));
     renumber();
     find_forces();
 }
@@ -103,15 +104,16 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
         if (!settled_.empty()) settled_.push_back(settled_[from]);
     boundary_.hold_further_fields(cracks_);
     internal_force_.sort_cells();
-    // A tip that ends may cut a piece free.
-    if (!cracks_.lines[crack].tip(at_end).inside || !pieces_.holds.empty()) find_pieces(false);
+    // A tip that ends, or comes near another crack, may cut a piece free.
+    if (!cracks_.lines[crack].tip(at_end).inside || cracks_.lines.size() > 1) find_pieces(false);
     renumber();
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
 }
 
-// Where bodies slide, contact decides what can move. What is loose before anything happens is an error in the scene, but for
-// crumbs, lighter than a cell, between cracks that cross.
+// Where bodies slide, contact decides what can move. What a crack drawn through has cut loose is an error in the scene, but for
+// crumbs, lighter than a cell, between cracks that cross; what the grid alone sees as loose, between cracks that nearly meet, is
+// not.
 void Equilibrium::find_pieces(bool crumbs_only) {
     if (!sliding_.empty()) return;
     const std::vector<double> mass = field_masses(body_, cracks_.fields());
@@ -299,41 +301,43 @@ void Equilibrium::mark_changes(bool geometric, double slack) {
         });
 }
 
-// Where the last tangent cannot be solved for as a piece between cracks hangs by a hinge, a ligament that no longer resists
-// bending: holds what moves most of it, which feels no force. Not where most of the specimen moves: that is held too little.
+// Where the last tangent cannot be solved for, as a piece between cracks hangs by a hinge, a ligament that does not resist
+// bending: a spring at one unknown of what moves without any force. No load is on it, as it is no part of the forces.
 bool Equilibrium::hold_hinge() {
-    constexpr int iterations = 3;
-    constexpr double moves = 1e-3, most_mass = 0.5;  // of the largest motion; of the specimen
-    if (!sliding_.empty() || cracks_.lines.empty() || equations_ == 0 || !(factor_.reciprocal_condition() > 0.0)) return false;
-    Eigen::MatrixXd mode(equations_, 1);  // by inverse iteration from loads that no mode is without
-    for (int e = 0; e < equations_; ++e) mode(e, 0) = 1.0 + std::sin(1.0 + e);
-    for (int k = 0; k < iterations; ++k) {
-        factor_.solve(mode);
-        const double largest = mode.cwiseAbs().maxCoeff();
-        if (!(largest > 0.0 && largest < INFINITY)) return false;
-        mode /= largest;
-    }
-    double moved = 0.0, all = 0.0;
-    int best = -1;
-    for (int dof = 0; dof < static_cast<int>(equation_.size()); ++dof) {
-        all += mass_[dof / 2];
-        if (equation_[dof] < 0) continue;
-        const double here = std::abs(mode(equation_[dof], 0));
-        if (here > moves) moved += mass_[dof / 2];
-        if (here == 1.0) best = dof;
-    }
-    if (best < 0 || moved > most_mass * all) return false;
-    pieces_.holds.push_back(best);
-    renumber();
+    if (!sliding_.empty() || cracks_.lines.empty() || equations_ == 0) return false;
+    if (find_loose_pieces(body_, cracks_, boundary_, mass_).holds.size() > pieces_.holds.size())
+        return false;  // hangs by nothing
+    const auto dof = std::ranges::find(equation_, factor_.weakest());
+    hinges_.push_back(static_cast<int>(dof - equation_.begin()));
     factor_.mark_all();
-    find_forces();
     return true;
 }
 
-// Whether all that is held beside the boundary, so that pieces do not move as a whole, feels no force.
-bool Equilibrium::pieces_are_at_rest(double scale) const {
-    constexpr double nothing = 1e-5;
-    return std::ranges::all_of(pieces_.holds, [&](int dof) { return std::abs(force_[dof / 2][dof % 2]) <= nothing * scale; });
+void Equilibrium::drop_hinges() {
+    if (!std::exchange(hinges_, {}).empty()) factor_.mark_all();
+}
+
+void Equilibrium::add_hinges() {
+    for (const int dof : hinges_) {
+        Eigen::Matrix<double, 8, 8> stiffness = Eigen::Matrix<double, 8, 8>::Zero();
+        stiffness(dof % 2, dof % 2) = body_.points.stiffest(0) * body_.layout.thickness;
+        add_extra(cell_at(cracks_.node_of_field[dof / 2]), std::array{dof / 2, -1, -1, -1}, stiffness);
+    }
+}
+
+// Whether most of the specimen moves with this unknown without any force: then it is held too little.
+bool Equilibrium::moves_most(int hinge) const {
+    constexpr double moves = 1e-3, most_mass = 0.5;  // of the largest motion; of the specimen
+    Eigen::MatrixXd mode = Eigen::MatrixXd::Zero(equations_, 1);
+    mode(equation_[hinge], 0) = 1.0;
+    factor_.solve(mode);
+    const double largest = mode.cwiseAbs().maxCoeff();
+    double moved = 0.0, all = 0.0;
+    for (int dof = 0; dof < static_cast<int>(equation_.size()); ++dof) {
+        all += mass_[dof / 2];
+        if (equation_[dof] >= 0 && std::abs(mode(equation_[dof], 0)) > moves * largest) moved += mass_[dof / 2];
+    }
+    return moved > most_mass * all;
 }
 
 // The tangent where it stands; with `slack`, of gradients that differ from these by so much at most.
@@ -351,6 +355,7 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     add_lone_points();
     add_pairs();
     add_edge_ties();
+    add_hinges();
     add_touches(geometric);
     couple_points(geometric);
     for (const int c : touched_cells_) factor_.mark(c);
@@ -404,7 +409,7 @@ double Equilibrium::take_step(const Eigen::VectorXd& step) {
     move(step, 1.0);
     find_forces();
     double here = slope_along(step);
-    for (int trial = 0; trial < most_trials && std::abs(here) > 0.5 * std::abs(at_start) && (here > 0.0 || high < 1.0); ++trial) {
+    for (int trial = 0; trial < most_trials && std::abs(here) > 0.5 * std::abs(at_start) && (here > 0.0 || gone < 1.0); ++trial) {
         double at_high = here;
         (here > 0.0 ? high : low) = gone;
         if (here <= 0.0) at_low = here;
@@ -446,13 +451,11 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     double slack = plan_.grows ? slack_of_tangent : 0.0;
     // Away from equilibrium the tangent need not be positive; without its geometric part it is, unless something is loose.
     const auto factor = [&] {
-        constexpr int most_hinges = 4;
-        for (int hinges = 0; hinges <= most_hinges; ++hinges) {
-            if ((slack > 0.0 && factor_tangent(true, slack)) || factor_tangent(true, 0.0) || factor_tangent(false, 0.0))
-                return true;
-            if (!hold_hinge()) return false;
-        }
-        return false;
+        constexpr int most_hinges = 6;
+        drop_hinges();
+        while (!(slack > 0.0 && factor_tangent(true, slack)) && !factor_tangent(true, 0.0) && !factor_tangent(false, 0.0))
+            if (hinges_.size() == most_hinges || !hold_hinge()) return false;
+        return std::ranges::none_of(hinges_, [&](int hinge) { return moves_most(hinge); });
     };
     find_forces();
     double residual = largest_residual();
@@ -484,7 +487,6 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
         if (residual <= balance * scale) {
-            if (!pieces_are_at_rest(scale)) return Outcome::mechanism;
             settle();
             return Outcome::solved;
         }
@@ -493,7 +495,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
                     ? residual > worth_keeping_with_friction * before
                     : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
-    return Outcome::not_converged;
+    return hinges_.empty() ? Outcome::not_converged : Outcome::mechanism;
 }
 
 void Equilibrium::refine() {
@@ -568,6 +570,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     boundary_.held = snapshot.held;
     boundary_.tied = snapshot.tied;
     pieces_ = snapshot.pieces;
+    drop_hinges();
     displacement_ = snapshot.displacement;
     time_ = next_time_ = snapshot.time;
     set_contacts(snapshot.contacts);

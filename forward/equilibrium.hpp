@@ -136,7 +136,9 @@ class Equilibrium {
     void find_forces();
     bool factor_tangent(bool geometric, double slack = 0.0);
     bool hold_hinge();
-    bool pieces_are_at_rest(double scale) const;
+    void drop_hinges();
+    void add_hinges();
+    bool moves_most(int hinge) const;
     GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
     void couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void couple_points(bool geometric);
@@ -214,6 +216,7 @@ class Equilibrium {
 
     GridFactor factor_;
     LoosePieces pieces_;         // that cracks have cut free
+    std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis
     std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
     std::vector<Mat2> pair_stiffness_;               // [pairs] as last factored [N/m]

@@ -230,6 +230,11 @@ bool GridFactor::eliminate(Box& box) {
     return true;
 }
 
+void GridFactor::fill(Box& box, const Assemble& assemble, Scratch& scratch) const {
+    if (box.half[0] < 0) assemble_leaf(box, assemble, scratch);
+    else take_in_halves(box);
+}
+
 bool GridFactor::factor_box(Box& box, const Assemble& assemble, Scratch& scratch) {
     if (!box.stale) return true;
     std::vector<int>& offset = box.offset;
@@ -240,11 +245,16 @@ bool GridFactor::factor_box(Box& box, const Assemble& assemble, Scratch& scratch
     box.border = offset.back() - box.inner;
     box.factor.resize(offset.back(), box.inner);
     box.left.resize(box.border, box.border);
-    if (box.half[0] < 0) assemble_leaf(box, assemble, scratch);
-    else take_in_halves(box);
-    if (!eliminate(box)) return false;
-    box.stale = false;
-    return true;
+    box.failed_at = -1;
+    fill(box, assemble, scratch);
+    box.stale = !eliminate(box);
+    if (!box.stale) return true;
+    fill(box, assemble, scratch);  // once more, as LAPACK tells where
+    const int leading = static_cast<int>(box.factor.rows());
+    int info = 0;
+    dpotrf_("L", &box.inner, box.factor.data(), &leading, &info);
+    box.failed_at = info > 0 ? info - 1 : box.inner - 1;
+    return false;
 }
 
 // Boxes within a box follow each other; this is the first of them.
@@ -539,6 +549,15 @@ double GridFactor::reciprocal_condition() const {
         largest = std::max(largest, box.largest_pivot);
     }
     return largest > 0.0 ? std::pow(least / largest, 2) : 0.0;
+}
+
+int GridFactor::weakest() const {
+    const auto failed = std::ranges::find_if(boxes_, [](const Box& box) { return box.failed_at >= 0; });
+    if (failed != boxes_.end()) return first_[failed->nodes[0]] + failed->failed_at;
+    const Box& box = *std::ranges::min_element(boxes_, {}, &Box::least_pivot);
+    int at = 0;
+    box.factor.diagonal().minCoeff(&at);
+    return first_[box.nodes[0]] + at;
 }
 
 }  // namespace crampfit

@@ -40,6 +40,9 @@ class GridFactor {
 
     /// Factors anew what has changed. False when it is not positive definite.
     bool factor(const Assemble& assemble);
+    /// The equation at which the last factorisation failed, or else that of its least pivot: one of those that what moves without
+    /// any force moves.
+    int weakest() const;
 
     /// Solves for right sides [equations x any number], in place. One call at a time.
     void solve(Eigen::MatrixXd& right) const;
@@ -70,6 +73,7 @@ class GridFactor {
         Eigen::MatrixXd factor;   // [inner + border x inner] lower triangle, and what is below
         Eigen::MatrixXd left;     // [border x border] what is left for the parent, lower triangle
         double least_pivot = 0, largest_pivot = 0;
+        int failed_at = -1;  // inner equation; -1: none
     };
 
     struct Scratch {             // of one box
@@ -82,6 +86,7 @@ class GridFactor {
     int first_within(int box) const;
     bool factor_within(int box, int forks, const Assemble& assemble);
     bool factor_box(Box& box, const Assemble& assemble, Scratch& scratch);
+    void fill(Box& box, const Assemble& assemble, Scratch& scratch) const;
     void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
     void take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const;
     static double* column_of(Box& box, int c);

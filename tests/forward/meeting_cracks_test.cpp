@@ -8,7 +8,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 namespace crampfit::test {
 namespace {
@@ -89,6 +91,35 @@ TEST(HardMeeting, TwoEdgeCracksConverge) {
     std::printf("%s\n", record.message.c_str());
     EXPECT_GT(record.series.back().fracture_energy, 0.0);  // one of them runs, the other may stand
     for (const Instant& row : record.series) EXPECT_TRUE(std::isfinite(row.force));
+}
+
+// Up to four cracks anywhere, inside and at the edges, drawn apart and sheared: each run comes to an end by itself.
+TEST(HardMeeting, CracksAtRandomEndWell) {
+    constexpr int runs = 60;
+    std::mt19937 random(7);
+    const auto between = [&](double low, double high) { return low + (high - low) * 0x1p-32 * static_cast<double>(random()); };
+    int lost = 0;
+    for (int run = 0; run < runs; ++run) {
+        Scene scene = square({});
+        scene.materials["EW"].toughness = 100.0;
+        scene.edges[0].velocity[0] = between(-1.0, 1.0) * mm_per_minute;
+        const int cracks = 1 + static_cast<int>(between(0.0, 4.0));
+        for (int k = 0; k < cracks; ++k) {
+            const bool at_edge = between(0.0, 1.0) < 0.6, left = between(0.0, 1.0) < 0.5;
+            const double angle = between(-0.8, 0.8), length = between(2.5, 9.0);
+            const Vec2 from(at_edge ? left ? 0.0 : 20.0 : between(2.0, 16.0), between(4.0, 16.0));
+            const Vec2 way((at_edge && !left ? -1.0 : 1.0) * std::cos(angle), std::sin(angle));
+            const Vec2 to = from + length * way;
+            Crack crack =
+                line(from, {std::clamp(to.x(), 1.5, 18.5), std::clamp(to.y(), 1.5, 18.5)}, at_edge ? Growth::end : Growth::both);
+            crack.direction = between(0.0, 1.0) < 0.5 ? GrowthDirection::normal_to_opening : GrowthDirection::hoop_stress;
+            scene.cracks.push_back(crack);
+        }
+        const Record record = simulate(scene);
+        lost += record.status == RunStatus::unstable;
+        for (const Instant& row : record.series) EXPECT_GE(row.strain_energy, -1e-12) << run;
+    }
+    hard_case("one to four cracks at random, 60 scenes", "each ends by itself", static_cast<double>(lost) / runs, 0.0);
 }
 
 TEST(HardMeeting, TwoEdgeCracksMeetHeadOn) {
