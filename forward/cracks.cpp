@@ -36,7 +36,9 @@ constexpr double reach_of_an_end = 1.5;
 // Masks are kept in eight bits.
 constexpr int most_cracks = 8;
 
-// Slopes to the grid, in cells, up to which a tip frees pairs by columns alone and from which on by places alone.
+// Slopes to the grid, in cells, up to which a tip frees pairs by columns alone and from which on by places alone. What a tip in
+// one wood gives up over two cells is evener by columns up to the first, and by places from the second on; in between the one law
+// goes over into the other, lest a tip that turns frees pairs at once. Chosen by that.
 constexpr double slope_of_columns = 0.5;
 constexpr double slope_of_places = 0.7;
 
@@ -288,6 +290,7 @@ double CrackFields::freed(int crack, int node) const {
     const Box support = body_->layout.support(node);
     double least = 1.0;
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
+        // Ahead of the tip or behind it: a tie lasts until the tip has gone its way, though it has left the support.
         if (!exit_distance(tip->position, tip->direction, support) && !exit_distance(tip->position, -tip->direction, support))
             continue;
         if (!tip->inside) {  // on another crack the cut ends, and where a hole does: what lies behind it is whole

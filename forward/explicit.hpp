@@ -132,7 +132,7 @@ class ExplicitSolver {
     double fastest_crack_ = 0;      // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
-    EnergyBooks half_a_step_ago_;  // books before the forces of the last step, tractions' but for
+    EnergyBooks half_a_step_ago_;  // books before the forces of the last step but the tractions'
 };
 
 }  // namespace crampfit

@@ -39,8 +39,8 @@ class TipTies {
         return energy(cracks, displacement, {}, 0.0, 0.0);
     }
 
-    /// Over a step of central differences in which a tie's stiffness k changes, the energy changes by - dk/2 times the stretch at
-    /// the next forces, `until` [s] ahead by the velocities, times that at the last, `since` [s] back: so counted.
+    /// The same as central differences have it [J]: over a step in which a tie's stiffness k changes, their energy changes by -
+    /// dk/2 times the stretch at the next forces, `until` [s] ahead by the velocities, times that at the last, `since` [s] back.
     double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
                   double since, double until) const;
 

@@ -33,4 +33,17 @@ displacement = "0.1 mm"
                        "bar.toml");
 }
 
+/// Its modulus as a parameter.
+inline Parameter bar_modulus() {
+    Parameter parameter;
+    parameter.name = "E";
+    parameter.keys = {"materials.EW.E"};
+    parameter.initial = 400e6;
+    parameter.lower = 100e6;
+    parameter.upper = 900e6;
+    parameter.unit = "MPa";
+    parameter.unit_factor = 1e6;
+    return parameter;
+}
+
 }  // namespace crampfit::testing

@@ -309,15 +309,7 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
     }
     experiment.noise.force = 2.0;
     study.experiments = {experiment};
-    Parameter parameter;
-    parameter.name = "E";
-    parameter.keys = {"materials.EW.E"};
-    parameter.initial = 400e6;
-    parameter.lower = 100e6;
-    parameter.upper = 900e6;
-    parameter.unit = "MPa";
-    parameter.unit_factor = 1e6;
-    study.parameters = {parameter};
+    study.parameters = {bar_modulus()};
     FitOptions options;
     options.threads = 1;
     for (const char* method : {"auto", "ceres", "bobyqa", "sbplx"}) {

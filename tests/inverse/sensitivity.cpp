@@ -330,13 +330,7 @@ TEST(SystemSensitivity, SaysWhatItsNumbersRestOnAndRefusesWhatDoesNotCount) {
     Study study;
     study.scene = bar_scene();
     study.outputs = {{"peak force", StudyOutput::Kind::peak_force}, {"crack", StudyOutput::Kind::crack_length_at, 0.05e-3}};
-    Parameter modulus;
-    modulus.name = "E";
-    modulus.keys = {"materials.EW.E"};
-    modulus.initial = 400e6;
-    modulus.lower = 100e6;
-    modulus.upper = 900e6;
-    study.parameters = {modulus};
+    study.parameters = {bar_modulus()};
     SensitivityOptions options;
     options.threads = 1;
     const Sensitivity local = study_sensitivity(study, options);
