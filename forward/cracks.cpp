@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace crampfit {
 
@@ -172,6 +173,7 @@ CrackFields::CrackFields(const Scene& scene, Discretisation& body, const Materia
         renew_ties(k);
     }
     new_fields_.clear();  // all at rest: nothing to hand on
+    moves.clear();
 }
 
 bool CrackFields::is_inside(const Vec2& x) const {
@@ -263,10 +265,16 @@ void CrackFields::end_at(CrackTip& tip, const Meeting& there) {
     tip.wall_on_left = is_left(there.crack, there.at - 0.5 * h * tip.direction);
 }
 
-// Beyond the face of another crack at which this one ends.
+// Beyond the face of another crack at which this one ends. Off that crack's own ends nothing is.
 bool CrackFields::beyond_wall(int crack, const Vec2& x) const {
+    const double reach = 3.0 * body_->layout.cell.maxCoeff();
     for (const CrackTip* tip : {&lines[crack].start, &lines[crack].end}) {
-        if (tip->wall < 0 || (x - tip->position).dot(tip->direction) < -3.0 * body_->layout.cell.maxCoeff()) continue;
+        if (tip->wall < 0 || (x - tip->position).dot(tip->direction) < -reach) continue;
+        const CrackLine& wall = lines[tip->wall];
+        const auto lies_off = [&](const CrackTip& end) {
+            return (x - end.position).dot(end.direction) > 0.0 && (tip->position - end.position).norm() < reach;
+        };
+        if (lies_off(wall.start) || lies_off(wall.end)) continue;
         if (is_left(tip->wall, x) != tip->wall_on_left) return true;
     }
     return false;
@@ -309,8 +317,11 @@ void CrackFields::sort_points(int crack, const Box& window) {
     Points& points = body_->points;
     const std::uint8_t bit = static_cast<std::uint8_t>(1u << crack);
     struct Node {
-        bool left, split;
+        bool left, split, free;
     };
+    std::vector<bool> is_free(layout.nodes(), false);  // whether the crack has cut the node's whole support
+    for (const FieldPair& pair : pairs)
+        if (pair.crack == crack && pair.freed >= 1.0) is_free[pair.node] = true;
     std::vector<std::optional<Node>> known(layout.nodes());  // several cells ask
     std::vector<bool> left;                                  // [points of a cell]
     body_->for_cells_in(window, [&](int c) {
@@ -320,13 +331,17 @@ void CrackFields::sort_points(int crack, const Box& window) {
         for (int p = first; p < last; ++p) left.push_back(is_left(crack, points.position[p]));
         for (int k = 0; k < layout.nodes_per_cell(); ++k) {
             std::optional<Node>& node = known[nodes[k]];
-            if (!node) node = {is_left(crack, layout.node_position(nodes[k])), freed(crack, nodes[k]) >= least_freed_};
+            if (!node)
+                node = {is_left(crack, layout.node_position(nodes[k])), freed(crack, nodes[k]) >= least_freed_,
+                        is_free[nodes[k]]};
             for (int p = first; p < last; ++p) {
-                const bool apart = left[p - first] != node->left && !beyond_wall(crack, points.position[p]);
                 std::uint8_t& mask = mask_[p][k];
                 const bool was_apart = mask & bit;
+                const bool stays = was_apart && node->free;  // behind a wall what ties still held grows together
+                const bool apart = left[p - first] != node->left && (stays || !beyond_wall(crack, points.position[p]));
                 mask = static_cast<std::uint8_t>(apart && (node->split || was_apart) ? mask | bit : mask & ~bit);
-                points.node[p][k] = field(nodes[k], mask, crack);
+                const int to = field(nodes[k], mask, crack);
+                if (const int from = std::exchange(points.node[p][k], to); from != to) moves.push_back({p, k, from, to});
             }
         }
     });
@@ -362,9 +377,14 @@ void CrackFields::add_pairs(int node, unsigned mask) {
         const int with_node = mask >> k & 1u ? other : own;
         const int beyond = mask >> k & 1u ? own : other;
         const bool node_is_left = is_left(k, x);
+        const auto like =
+            std::ranges::find_if(pairs, [&](const FieldPair& pair) { return pair.node == node && pair.crack == k; });
+        const bool is_first = like == pairs.end();
         pairs.push_back({node_is_left ? with_node : beyond, node_is_left ? beyond : with_node, with_node, node, k,
                          left_of(lines[k].direction_near(true, x)), on_the_way, along, plane_modulus,
-                         pair_compliance / (plane_modulus * body_->layout.thickness), 0.0, 0.0});
+                         pair_compliance / (plane_modulus * body_->layout.thickness), is_first ? freed(k, node) : like->freed,
+                         0.0, is_first ? -1 : static_cast<int>(like - pairs.begin())});
+        set_tie(pairs.back());
     }
 }
 
@@ -377,16 +397,19 @@ void CrackFields::renew_sides(int crack) {
     }
 }
 
-void CrackFields::renew_ties(int crack) {
+void CrackFields::set_tie(FieldPair& pair) const {
     constexpr double smallest = 1e-6;
+    const double f = std::max({least_freed_, pair.freed, smallest});
+    pair.tie = (1.0 - f) / (f * pair.compliance);
+}
+
+void CrackFields::renew_ties(int crack) {
     for (FieldPair& pair : pairs) {
         if (pair.crack != crack) continue;
         const double now = freed(crack, pair.node);
-        // A turn makes the way past a pair longer; what the crack has cut stays so, but for wood behind a wall that it has come
-        // to.
-        if (pair.freed < 1.0 || now <= 0.0) pair.freed = now;
-        const double f = std::max({least_freed_, pair.freed, smallest});
-        pair.tie = (1.0 - f) / (f * pair.compliance);
+        // A turn makes the way past a pair longer; what the crack has cut stays so.
+        if (pair.freed < 1.0) pair.freed = now;
+        set_tie(pair);
     }
 }
 
@@ -406,6 +429,7 @@ std::vector<CrackFields::NewField> CrackFields::grow(int crack, bool at_end, con
     else line.points.insert(at_end ? line.points.end() : line.points.begin(), tip.position);
 
     new_fields_.clear();
+    moves.clear();
     sort_points(crack, window(from, to));
     renew_sides(crack);
     renew_ties(crack);

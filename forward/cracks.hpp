@@ -50,19 +50,21 @@ struct FieldPair {
     double compliance;     // of the pair when it is free [m/N]
     double freed;          // share of the way past the pair that the tip has gone; 1: the crack has cut the node's whole support
     double tie;            // stiffness that still holds the pair together [N/m]; 0 once the pair is free
+    int like;              // an earlier pair of this crack at the node, that another crack has split; -1: none
 };
 
 /// Share of its way past a node that a tip has gone: below 0 before, above 1 after. Along the grid, and at up to 27 degrees to
 /// it, a tip passes all nodes of a column of the grid, or of a row, in half a cell before and behind the place where it crosses
-/// it. So one column follows another, and as much energy is given up on all of the way. At 35 to 55 degrees, where it goes through
-/// as many rows as columns, nodes are passed by their places along the crack. In between the two go over into one another.
+/// it. So one column follows another, and as much energy is given up on all of the way. At 35 to 55 degrees, where it goes
+/// through as many rows as columns, nodes are passed by their places along the crack. In between the two go over into one
+/// another.
 double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout);
 
 /// The length of that way [m].
 double way_past_a_node(const Vec2& direction, const Vec2& cell);
 
-/// At equilibrium a pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer than
-/// the wood: with less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
+/// At equilibrium a pair of fields appears as soon as the tip has gone this part of a cell. Its tie is then that much stiffer
+/// than the wood: with less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
 inline constexpr double least_freed_at_rest = 0.02;
 
 /// What still holds the pair of fields at a node together when so much of it is freed [N/m]; `stiffness`: E' of the wood times
@@ -90,8 +92,14 @@ class CrackFields {
         int from;  // the field whose motion it starts with
     };
 
+    struct Move {
+        int point, corner;  // of its cell
+        int from, to;       // fields
+    };
+
     std::vector<CrackLine> lines;
     std::vector<FieldPair> pairs;
+    std::vector<Move> moves;         // of points from field to field when a crack grew last
     std::vector<int> node_of_field;  // [fields] the node where each field is
 
     int fields() const { return static_cast<int>(node_of_field.size()); }
@@ -132,6 +140,7 @@ class CrackFields {
     void add_pairs(int node, unsigned mask);
     void renew_sides(int crack);
     void renew_ties(int crack);
+    void set_tie(FieldPair& pair) const;
 
     const Scene* scene_;
     Discretisation* body_;

@@ -68,6 +68,7 @@ void ExplicitSolver::step() {
     ties_.settle(cracks_, mass_, force_);
     ties_.pull(cracks_, displacement_, force_);
     advance_velocities();
+    struck_ = 0.0;
     close_crack_faces(true);
     prescribe_velocities();
     carry_velocities();
@@ -160,6 +161,7 @@ void ExplicitSolver::close_crack_faces(bool with_force) {
         const Vec2 gained = dt * (acceleration_[pair.left] - acceleration_[pair.right]);  // by the other forces
         const Vec2 twice_mean = by_points ? -gained : Vec2(2.0 * rate - gained + change);
         books_.damped -= 0.5 * m_left * m_right / total * change.dot(twice_mean);
+        if (!by_points) struck_ += 0.25 * m_left * m_right / total * change.dot(gained + change);
         face_force_[k] = m_left * m_right / total / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;
@@ -207,11 +209,12 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
 EnergyBooks ExplicitSolver::energies() const {
     // As of the last forces: half of the product of velocities before and after them with the strain energy is what a leapfrog
     // keeps (Hairer, Lubich and Wanner 2003), exactly so where forces are linear.
-    // Of what that step's forces did from half a step before to half a step behind, one half.
+    // Of what that step's forces did from half a step before to half a step behind, one half; of an impact, what it took from the
+    // velocity before.
     EnergyBooks books = books_;
     if (time_ > 0.0) {
         books.work = 0.5 * (books_.work + half_a_step_ago_.work);
-        books.damped = 0.5 * (books_.damped + half_a_step_ago_.damped);
+        books.damped = 0.5 * (books_.damped + half_a_step_ago_.damped) + struck_;
     }
     const double since = time_ > 0.0 ? (0.5 + lag()) * plan_.time_step : 0.0;
     std::vector<Vec2> there = displacement_;

@@ -73,6 +73,7 @@ class ExplicitSolver {
         double allowed = std::numeric_limits<double>::infinity();      // how far a Rayleigh wave leaves it to go at once [m]
         double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
         double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
+        double owed = 0;                                               // energy that turns have given it [J]
         Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
         std::unique_ptr<TipPatch> patch;                               // as of some time ago
         double since_patch = 0;                                        // how far it has gone since that was made [m]
@@ -85,6 +86,7 @@ class ExplicitSolver {
     double lag() const;
     double kinetic_energy() const;
     void adopt(const std::vector<CrackFields::NewField>& fields, double softness);
+    void carry_over(const std::vector<CrackFields::Move>& moves);
     Vec2 mean_velocity_of(int driver, double from, double to) const;
     Vec2 velocity_at_end_of_step(int driver) const;
 
@@ -133,6 +135,7 @@ class ExplicitSolver {
     double time_ = 0.0;
     EnergyBooks books_;
     EnergyBooks half_a_step_ago_;  // books before the forces of the last step but the tractions'
+    double struck_ = 0.0;          // of what closed faces lost in the last step: by its middle, beyond a half [J]
 };
 
 }  // namespace crampfit

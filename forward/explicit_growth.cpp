@@ -23,6 +23,12 @@ constexpr double cells_in_speed = 8.0;  // over which it is told
 // A patch about a tip is good while the tip keeps its direction by 10 degrees.
 constexpr double most_turn_cosine = 0.985;
 
+constexpr double sharp_turn_cosine = 0.97;  // 14 degrees
+
+// What sharp turns have given or taken is paid back by this part of the toughness: slowly, lest a tip passes tough wood on
+// credit.
+constexpr double most_repaid = 0.1;
+
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
 
@@ -46,11 +52,14 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
     state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
 
-    const double since = (0.5 + lag()) * plan_.time_step, until = (0.5 - lag()) * plan_.time_step;
+    const TipTies::Motion motion{displacement_, velocity_, (0.5 + lag()) * plan_.time_step, (0.5 - lag()) * plan_.time_step};
+    const double toughness = toughness_to_overcome(crack, at_end, wood.toughness) * body_.layout.thickness;  // [J/m]
+    const auto asked = [&](double on) {
+        return toughness * on + std::clamp(state.owed, -most_repaid * toughness * on, most_repaid * toughness * on);
+    };
+    const bool is_held = ties_.holds(cracks_, crack, at_end);
     double way = 0.0;
-    if (ties_.holds(cracks_, crack, at_end))
-        way = ties_.balanced_way(cracks_, crack, at_end, toughness_to_overcome(crack, at_end, wood.toughness), state.allowed,
-                                 displacement_, velocity_, since, until);
+    if (is_held) way = ties_.balanced_way(cracks_, crack, at_end, asked, state.allowed, motion);
     else if (load_at(crack, at_end).G >= wood.toughness)  // nothing holds it, as in a void: the far field decides, at no cost
         way = std::min(state.allowed, leg_in_cells * cell);
     if (way < least_way_in_cells * cell) return;
@@ -71,8 +80,14 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     state.since_patch += way;
     state.allowed -= way;
     note_speed(state, way);
-    // As the ties have it: a tip that turns frees pairs otherwise than the balance has seen.
-    books_.fracture += ties_.energy(cracks_, displacement_, velocity_, since, until);
+    // A tip that turns frees pairs otherwise than the balance has seen, and points change sides. What a sharp turn gives or takes
+    // is set against what is asked for on the way to come; small ones go to and fro.
+    const bool turns_sharply = is_held && direction.dot(tip.direction) < sharp_turn_cosine;
+    const double taken = turns_sharply ? ties_.taken_on(cracks_, crack, at_end, way, motion) : 0.0;
+    const auto energy = [&] {
+        return ties_.energy(cracks_, motion) + (turns_sharply ? internal_force_.energy(displacement_) : 0.0);
+    };
+    double given = energy();
     if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
         ties_.take_in(cracks_, mass_, displacement_, false);
     } else {
@@ -80,7 +95,10 @@ void ExplicitSolver::grow(int crack, bool at_end) {
             materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
-    books_.fracture -= ties_.energy(cracks_, displacement_, velocity_, since, until);
+    given -= energy();
+    books_.fracture += given;
+    if (turns_sharply) state.owed += taken - given;
+    else if (is_held) state.owed -= std::clamp(given - toughness * way, std::min(0.0, state.owed), std::max(0.0, state.owed));
     if (bridges_) bridges_->take_in(cracks_, mass_);
 }
 

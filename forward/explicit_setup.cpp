@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace crampfit {
 
@@ -82,6 +83,37 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     books_.work = at_start.strain + at_start.kinetic + at_start.damped + at_start.fracture;
 }
 
+// Points that go to another field take their momentum along, as in an impact without rebound. Where no others
+// are with them, their motion is the field's.
+void ExplicitSolver::carry_over(const std::vector<CrackFields::Move>& moves) {
+    struct Arrival {
+        double mass = 0.0;
+        Vec2 displacement = Vec2::Zero(), velocity = Vec2::Zero(), carried = Vec2::Zero();  // times mass
+        double kinetic = 0.0;                                                               // twice
+    };
+    std::map<int, Arrival> arrivals;
+    for (const CrackFields::Move& move : moves) {
+        const double mass = body_.points.mass[move.point] * body_.weights[body_.points.slot[move.point]].value[move.corner];
+        Arrival& at = arrivals[move.to];
+        at.mass += mass;
+        at.displacement += mass * displacement_[move.from];
+        at.velocity += mass * velocity_[move.from];
+        at.carried += mass * carried_[move.from];
+        at.kinetic += mass * velocity_[move.from].squaredNorm();
+    }
+    for (const auto& [field, come] : arrivals) {
+        constexpr double rounding = 1e-9;  // of its mass
+        const double rest = mass_[field] - come.mass;
+        const bool all_new = rest <= rounding * mass_[field];
+        const double stayed = all_new ? 0.0 : rest;
+        const double kinetic = stayed * velocity_[field].squaredNorm() + come.kinetic;
+        if (all_new) displacement_[field] = come.displacement / come.mass;
+        velocity_[field] = (stayed * velocity_[field] + come.velocity) / mass_[field];
+        carried_[field] = (stayed * carried_[field] + come.carried) / mass_[field];
+        books_.damped += 0.5 * (kinetic - mass_[field] * velocity_[field].squaredNorm());
+    }
+}
+
 void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {
     for (const auto& [added, from] : fields) {
         displacement_.push_back(displacement_[from]);
@@ -93,6 +125,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     boundary_.hold_further_fields(cracks_);
     list_held();
     mass_ = field_masses(body_, cracks_.fields());
+    carry_over(cracks_.moves);
     internal_force_.sort_cells();
     if (bridges_) softness *= bridges_->softer_ties(cracks_, softness);
     ties_.take_in(cracks_, mass_, displacement_, false, softness);

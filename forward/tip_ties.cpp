@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace crampfit {
 
@@ -28,35 +29,56 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
     const std::size_t known = ties_.size();
     ties_.resize(cracks.pairs.size());
     live_.clear();
-    for (std::size_t k = 0; k < ties_.size(); ++k) {
+    const auto goes_on_like = [&](std::size_t k) -> std::optional<std::size_t> {
+        const int like = k >= known ? cracks.pairs[k].like : -1;
+        if (like < 0 || like >= static_cast<int>(known) || ties_[like].compliance == 0.0 || ties_[like].waits) return {};
+        return like;
+    };
+    std::vector<bool> is_split(ties_.size(), false);  // by another crack: what a tie holds is shared out
+    for (std::size_t k = known; k < ties_.size(); ++k)
+        if (const auto like = goes_on_like(k)) is_split[k] = is_split[*like] = true;
+    for (std::size_t k = ties_.size(); k-- > 0;) {  // what is split off comes before what it was
         const FieldPair& pair = cracks.pairs[k];
         Tie& tie = ties_[k];
         const double left = mass[pair.left];
         const double right = mass[pair.right];
-        if (k >= known) {
-            tie.waits = !at_rest;
-            tie.softness = softness;
-            if (!at_rest) tie.from = std::max(0.0, pair.freed);
+        const Vec2 jump = jump_of(pair, displacement);
+        const auto like = goes_on_like(k);
+        const bool is_new = !like && (k >= known || tie.compliance == 0.0);  // or there was no wood on one side
+        if (like) {
+            tie = ties_[*like];
+            tie.stretch += jump_of(cracks.pairs[*like], displacement) - jump;
+        } else if (is_new) {
+            tie = {.waits = !at_rest,
+                   .from = at_rest ? 0.0 : std::max(0.0, pair.freed),
+                   .softness = k >= known ? softness : tie.softness,
+                   .begun_at = jump};
             tie.pulled_at = share(tie, pair.freed);
         }
         if (pair.freed >= 1.0 || left == 0.0 || right == 0.0 || !std::isfinite(pair.compliance)) continue;
         live_.push_back(k);
         // A crack between two rows of nodes has a pair on either: they share the tie as they share the mass beyond the crack.
         const double shared = 4.0 * left * right / ((left + right) * (left + right));
-        const double f = share(tie, pair.freed);
-        const Vec2 jump = jump_of(pair, displacement);
-        if (k < known && tie.compliance == 0.0) tie.waits = true;  // there was no wood on one side
-        // A tip that has turned back to the beginning of the way past a pair would be held by a rigid tie: then by the last one.
-        const double held_at = f + tie.slack > 0.0 ? f : tie.pulled_at;
-        const Vec2 before = k < known && !tie.waits ? Vec2(stiffness(tie, held_at) * (jump + tie.stretch)) : Vec2(Vec2::Zero());
         const double compliance = tie.softness * pair.compliance / shared;
         const double most = most_frequency_squared_ * left * right / (left + right);
-        const double slack = std::max(k < known ? tie.slack : 0.0, (1.0 - f) / (most * compliance) - f);
+        const double f = share(tie, pair.freed);
+        const double slack = std::max(tie.slack, (1.0 - f) / (most * compliance) - f);
         if (slack == tie.slack && compliance == tie.compliance) continue;
+        const Tie before = tie;
         tie.compliance = compliance;
         tie.slack = slack;
-        if (k < known && !tie.waits) tie.stretch = before / stiffness(tie, f) - jump;  // goes on with the same force
+        if (is_new || tie.waits) continue;
+        if (is_split[k]) {
+            tie.held *= before.compliance / compliance;
+            continue;
+        }
+        // It goes on with the same force and energy; of a tip that has turned back, no harder than it did.
+        const double at = std::max(f, tie.pulled_at);
+        const Vec2 force = stiffness(before, at) * (jump + before.stretch);
+        tie.stretch = force / stiffness(tie, f) - jump;
+        tie.held = (0.5 * force.dot(tie.stretch - before.stretch) + (1.0 - at) * before.held) / (1.0 - f);
     }
+    std::ranges::sort(live_);
 }
 
 void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force) {
@@ -66,9 +88,10 @@ void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass,
         const FieldPair& pair = cracks.pairs[k];
         const double left = mass[pair.left];
         const double right = mass[pair.right];
-        Vec2 held = (right * force[pair.left] - left * force[pair.right]) / (left + right);  // both sides go on alike
-        held -= std::min(0.0, held.dot(pair.normal)) * pair.normal;                          // pressure is left to the faces
-        tie.stretch = tie.slack * tie.compliance * held;
+        Vec2 hold = (right * force[pair.left] - left * force[pair.right]) / (left + right);  // both sides go on alike
+        hold -= std::min(0.0, hold.dot(pair.normal)) * pair.normal;                          // pressure is left to the faces
+        tie.stretch = tie.slack * tie.compliance * hold - tie.begun_at;
+        tie.held = 0.5 * tie.slack * tie.compliance * hold.squaredNorm();
         tie.waits = false;
     }
 }
@@ -84,18 +107,17 @@ void TipTies::pull(const CrackFields& cracks, const std::vector<Vec2>& displacem
     }
 }
 
-double TipTies::energy(const CrackFields& cracks, const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
-                       double since, double until) const {
+double TipTies::energy(const CrackFields& cracks, const Motion& motion) const {
     double sum = 0.0;
     for (const std::size_t k : live_) {
         const FieldPair& pair = cracks.pairs[k];
         const Tie& tie = ties_[k];
         if (tie.waits) continue;
         const double f = share(tie, pair.freed);
-        const Vec2 here = jump_of(pair, displacement) + tie.stretch;
-        const Vec2 rate = velocity.empty() ? Vec2(Vec2::Zero()) : jump_of(pair, velocity);
-        sum += 0.5 * stiffness(tie, f) * std::max(0.0, (here - since * rate).dot(here + until * rate));
-        if (tie.slack > 0.0) sum -= 0.5 * (1.0 - f) * tie.stretch.squaredNorm() / (tie.slack * tie.compliance);
+        const Vec2 here = jump_of(pair, motion.displacement) + tie.stretch;
+        const Vec2 rate = jump_of(pair, motion.velocity);
+        sum += 0.5 * stiffness(tie, f) * std::max(0.0, (here - motion.since * rate).dot(here + motion.until * rate));
+        sum -= (1.0 - f) * tie.held;
     }
     return sum;
 }
@@ -111,32 +133,32 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
     return std::any_of(live_.begin(), live_.end(), [&](std::size_t k) { return is_of(cracks, cracks.pairs[k], crack, at_end); });
 }
 
-double TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                             const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double since,
-                             double until) const {
+double TipTies::taken_on(const CrackFields& cracks, int crack, bool at_end, double way, const Motion& motion) const {
     const double width_here = width(cracks.lines[crack].tip(at_end));
-    const auto taken_on = [&](double way) {  // [J]
-        double sum = 0.0;
-        for (const std::size_t k : live_) {
-            const FieldPair& pair = cracks.pairs[k];
-            const Tie& tie = ties_[k];
-            if (tie.waits || !is_of(cracks, pair, crack, at_end)) continue;
-            const Vec2 here = jump_of(pair, displacement) + tie.stretch;
-            const Vec2 rate = velocity[pair.left] - velocity[pair.right];
-            const Vec2 before = here - since * rate, next = here + until * rate;
-            const double from = share(tie, pair.freed);
-            const double to = share(tie, pair.freed + way / width_here);
-            sum += 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, next.dot(before));
-            if (tie.slack > 0.0) sum -= 0.5 * (to - from) * tie.stretch.squaredNorm() / (tie.slack * tie.compliance);
-        }
-        return sum;
-    };
-    const auto asked_on = [&](double way) { return toughness * thickness_ * way; };
-    if (taken_on(most) >= asked_on(most)) return most;
+    double sum = 0.0;
+    for (const std::size_t k : live_) {
+        const FieldPair& pair = cracks.pairs[k];
+        const Tie& tie = ties_[k];
+        if (tie.waits || !is_of(cracks, pair, crack, at_end)) continue;
+        const Vec2 here = jump_of(pair, motion.displacement) + tie.stretch;
+        const Vec2 rate = jump_of(pair, motion.velocity);
+        const Vec2 before = here - motion.since * rate, next = here + motion.until * rate;
+        const double from = share(tie, pair.freed);
+        const double to = share(tie, pair.freed + way / width_here);
+        sum += 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, next.dot(before));
+        sum -= (to - from) * tie.held;
+    }
+    return sum;
+}
+
+double TipTies::balanced_way(const CrackFields& cracks, int crack, bool at_end, const std::function<double(double)>& asked,
+                             double most, const Motion& motion) const {
+    const auto pays = [&](double way) { return taken_on(cracks, crack, at_end, way, motion) >= asked(way); };
+    if (pays(most)) return most;
     double low = 0.0, high = most;
     for (int k = 0; k < 20; ++k) {
         const double middle = 0.5 * (low + high);
-        (taken_on(middle) > asked_on(middle) ? low : high) = middle;
+        (pays(middle) ? low : high) = middle;
     }
     return low;
 }

@@ -2,6 +2,7 @@
 
 #include "forward/cracks.hpp"
 
+#include <functional>
 #include <vector>
 
 namespace crampfit {
@@ -35,20 +36,28 @@ class TipTies {
     /// Adds the ties' forces to those of the fields [N].
     void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
 
+    /// Of the fields, and when the forces are and were: `until` [s] ahead and `since` [s] back by the velocities.
+    struct Motion {
+        const std::vector<Vec2>& displacement;  // [m]
+        const std::vector<Vec2>& velocity;      // [m/s]; any where the times are nil
+        double since = 0.0, until = 0.0;
+    };
+
     double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {  // [J]
-        return energy(cracks, displacement, {}, 0.0, 0.0);
+        return energy(cracks, Motion{displacement, displacement});
     }
 
     /// The same as central differences have it [J]: over a step in which a tie's stiffness k changes, their energy changes by -
-    /// dk/2 times the stretch at the next forces, `until` [s] ahead by the velocities, times that at the last, `since` [s] back.
-    double energy(const CrackFields& cracks, const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity,
-                  double since, double until) const;
+    /// dk/2 times the stretch at the next forces times that at the last.
+    double energy(const CrackFields& cracks, const Motion& motion) const;
 
-    /// How far a tip goes straight on, up to `most` [m], until it has taken up what the toughness [J/m^2] asks for: more than
-    /// that where `most` ends the way. Times as for the energy.
-    double balanced_way(const CrackFields& cracks, int crack, bool at_end, double toughness, double most,
-                        const std::vector<Vec2>& displacement, const std::vector<Vec2>& velocity, double since,
-                        double until) const;
+    /// What a tip takes up on its straight way on [J], by that energy.
+    double taken_on(const CrackFields& cracks, int crack, bool at_end, double way, const Motion& motion) const;
+
+    /// How far a tip goes straight on, up to `most` [m], until it has taken up what is asked for on its way [m to J]: more than
+    /// that where `most` ends the way.
+    double balanced_way(const CrackFields& cracks, int crack, bool at_end, const std::function<double(double)>& asked,
+                        double most, const Motion& motion) const;
 
     /// Whether it is this tip that frees the pair.
     static bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end);
@@ -62,7 +71,9 @@ class TipTies {
         double compliance = 0;  // c [m/N]
         double slack = 0;       // s
         double softness = 1;
-        Vec2 stretch = Vec2::Zero();  // s c F0 [m]
+        Vec2 begun_at = Vec2::Zero();  // jump when it came up, where another crack had opened the pair [m]
+        Vec2 stretch = Vec2::Zero();   // s c F0 less that jump [m]
+        double held = 0;               // by the slack at the start, s c F0^2 / 2 [J]
     };
     double share(const Tie& tie, double freed) const;
     double stiffness(const Tie& tie, double f) const;

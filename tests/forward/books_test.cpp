@@ -104,6 +104,37 @@ TEST(VerificationBooks, CracksOutOfAHolePayForTheirWay) {
     EXPECT_LT(record.worst_energy_imbalance, closed);
 }
 
+// Edge cracks askew to the grid that turn as soon as they grow, by up to 70 degrees: what the turn does to the pairs that the tip
+// is passing is neither gained nor lost.
+TEST(VerificationBooks, ATipThatTurnsPaysForItsWay) {
+    double least = 2.0, most = 0.0;
+    for (const double angle : {-70.0, -60.0, -44.0, -30.0, 30.0}) {
+        for (const double shear : {0.0, 1.0}) {
+            Scene scene = block({7e-3, 7e-3}, 0.25e-3);
+            scene.materials["EW"].toughness = 100.0;
+            scene.edges = {moving("top", Side::top, {2.0 * shear, 2.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            Crack crack;
+            crack.points = {Vec2(0.0, 3.6e-3), Vec2(2e-3 * std::cos(angle * degree), 3.6e-3 + 2e-3 * std::sin(angle * degree))};
+            crack.grows = Growth::end;
+            crack.direction = GrowthDirection::hoop_stress;
+            scene.cracks = {crack};
+            scene.measure = {"top", "top"};
+            scene.stop.displacement = 0.4e-3;
+            const Record record = simulate(scene);
+            const Instant& end = record.series.back();
+            const double way = end.crack_length - 2e-3;
+            const double spent = end.fracture_energy / (100.0 * scene.model.thickness * way);
+            std::printf("crack at %+.0f degrees, shear %.0f: %.2f mm, fracture energy %.3f of toughness times area\n", angle,
+                        shear, 1e3 * way, spent);
+            least = std::min(least, spent);
+            most = std::max(most, spent);
+            EXPECT_GT(way, 1e-3);
+        }
+    }
+    EXPECT_GT(least, 0.99);
+    EXPECT_LT(most, 1.06);  // a tip that waves hold back takes up more
+}
+
 // Two equal squares whose corners lie on one line: nothing before they touch, then they change their velocities.
 TEST(VerificationBooks, PartsOfOneHeightMeetWhereTheyMeet) {
     constexpr double speed = 0.4, gap = 0.5e-3, side = 10e-3;
