@@ -83,8 +83,8 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
     books_.work = at_start.strain + at_start.kinetic + at_start.damped + at_start.fracture;
 }
 
-// Points that go to another field take their momentum along, as in an impact without rebound. Where no others
-// are with them, their motion is the field's.
+// Points that go to another field take their momentum along, as in an impact without rebound. Where no others are with them,
+// their motion is the field's.
 void ExplicitSolver::carry_over(const std::vector<CrackFields::Move>& moves) {
     struct Arrival {
         double mass = 0.0;
