@@ -37,6 +37,7 @@ constexpr double worth_keeping_with_friction = 0.25;
 // equilibrium is unstable.
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
+constexpr int sorting = 6;  // iterations without an end after which faces that rub are sorted into those that grip and slide
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -124,13 +125,17 @@ void Equilibrium::find_pieces(bool crumbs_only) {
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
     const double gap = (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal);
     if (gap >= 0.0 || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
-    const double stiffness = face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
+    const double stiffness = closed_stiffness(pair);
     if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) return stiffness * Mat2::Identity();
     return stiffness * pair.normal * pair.normal.transpose();
 }
 
 Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const {
     return shared_tie(pair, mass_) * Mat2::Identity() + face_stiffness(pair);
+}
+
+double Equilibrium::closed_stiffness(const FieldPair& pair) const {
+    return face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
 }
 
 // Forces out of balance, reactions, and the energies that are not the points'.
@@ -243,7 +248,9 @@ void Equilibrium::add_pairs() {
         const FieldPair& pair = cracks_.pairs[k];
         const int cell = cell_at(pair.node);
         Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
-        if (const Drag drag = face_drag(k); drag.limit > 0.0) {
+        if (joins_faces_ && rubs(pair)) {
+            stiffness = (shared_tie(pair, mass_) + joint * closed_stiffness(pair)) * Mat2::Identity();
+        } else if (const Drag drag = face_drag(k); drag.limit > 0.0) {
             const Vec2 along = left_of(pair.normal);
             const Mat2 symmetric = drag.stiffness * along * along.transpose();
             stiffness += symmetric;
@@ -491,6 +498,11 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             return Outcome::solved;
         }
         if (iteration >= quick_iterations) slack = 0.0;
+        if (!settled_.empty() && iteration % sorting == sorting - 1 && sort_out_faces()) {
+            residual = largest_residual();
+            renew = true;
+            continue;
+        }
         renew = plan_.friction
                     ? residual > worth_keeping_with_friction * before
                     : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
@@ -529,6 +541,12 @@ double Equilibrium::potential() const {
 double Equilibrium::measured_displacement(double time) const {
     const Vec2 moved = boundary_.moved(gauges_.displacement, time, displacement_) + moved_[gauges_.displacement];
     return moved.dot(gauges_.displacement_direction);
+}
+
+double Equilibrium::negligible_work() const {
+    double way = 0.0;
+    for (int driver = 0; driver < boundary_.drivers(); ++driver) way = std::max(way, place_of(driver).norm());
+    return balance * least_force_ * way;
 }
 
 double Equilibrium::power() const {

@@ -55,6 +55,7 @@ class Equilibrium {
     double dissipated() const;                                        // by friction and in wood that remembers so far [J]
     double measured_displacement(double time) const;                  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
+    double negligible_work() const;                                   // of forces that count as none, on the drivers' way [J]
     double power() const;                                             // of what prescribes motion, dPi/dt at standing cracks [W]
     TipLoad load_at(int crack, bool at_end) const { return load_at(crack, at_end, displacement_, materials_); }
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
@@ -160,9 +161,12 @@ class Equilibrium {
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
+    double closed_stiffness(const FieldPair& pair) const;
     Vec2 place_of(int driver) const { return boundary_.travel(driver, time_) + moved_[driver]; }  // how far it has come [m]
     double lag(const Boundary::Tied& tie) const { return place_of(tie.driver)[tie.axis] - displacement_[tie.field][tie.axis]; }
+    bool rubs(const FieldPair& pair) const;
     Drag face_drag(std::size_t pair) const;
+    bool sort_out_faces();
     std::vector<Vec2> face_forces() const;
     void find_free_bodies();
     void find_pieces(bool crumbs_only);
@@ -175,7 +179,7 @@ class Equilibrium {
     }
     int row_of_body(int driver, int axis) const;
     Eigen::VectorXd out_of_balance() const;
-    Eigen::VectorXd bordered_step(const Eigen::VectorXd& right) const;
+    Eigen::MatrixXd bordered_step(const Eigen::MatrixXd& right) const;
     Eigen::VectorXd remainder_of(const Eigen::VectorXd& step) const;
     Eigen::VectorXd tangent_step(const Eigen::VectorXd& right) const;
     double largest_residual() const;
@@ -267,6 +271,8 @@ class Equilibrium {
     std::vector<Vec2> settled_;     // displacement from which friction on crack faces counts; empty: no such faces
     std::vector<Grip> face_grips_;  // [pairs, or fewer: the others have not slid yet]
     double face_dissipated_ = 0;    // until then [J]
+    static constexpr double joint = 0.01;  // stiffness of a spring between faces over that of closed ones
+    bool joins_faces_ = false;             // in the tangent, faces that rub by springs whether they touch or not
 };
 
 }  // namespace crampfit

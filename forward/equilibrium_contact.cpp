@@ -100,13 +100,13 @@ bool Equilibrium::border_tangent() {
     return true;
 }
 
-Eigen::VectorXd Equilibrium::bordered_step(const Eigen::VectorXd& right) const {
-    Eigen::MatrixXd grid = right.head(equations_);
+Eigen::MatrixXd Equilibrium::bordered_step(const Eigen::MatrixXd& right) const {
+    Eigen::MatrixXd grid = right.topRows(equations_);
     factor_.solve(grid);
     if (free_.empty()) return grid;
-    Eigen::VectorXd step(right.size());
-    const Eigen::VectorXd bodies = free_yield_ * (right.tail(free_yield_.rows()) + free_load_.transpose() * grid.col(0));
-    step << grid.col(0) + free_motion_ * bodies, bodies;
+    Eigen::MatrixXd step(right.rows(), right.cols());
+    const Eigen::MatrixXd bodies = free_yield_ * (right.bottomRows(free_yield_.rows()) + free_load_.transpose() * grid);
+    step << grid + free_motion_ * bodies, bodies;
     return step;
 }
 
@@ -279,11 +279,15 @@ bool Equilibrium::take_in_spread() {
     return factor_.add_wide(rows, stiffness);
 }
 
+bool Equilibrium::rubs(const FieldPair& pair) const {
+    return scene_.cracks[pair.crack].faces.coefficient > 0.0 && mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0;
+}
+
 // Friction between the faces of a pair, on the left one.
 Drag Equilibrium::face_drag(std::size_t k) const {
     const FieldPair& pair = cracks_.pairs[k];
+    if (!rubs(pair)) return {};
     const double friction = scene_.cracks[pair.crack].faces.coefficient;
-    if (friction == 0.0 || mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) return {};
     const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
     const Vec2 before = settled_[pair.left] - settled_[pair.right];
     const double stiffness = pair.normal.dot(face_stiffness(pair) * pair.normal);
@@ -292,6 +296,44 @@ Drag Equilibrium::face_drag(std::size_t k) const {
     const double depth_before = std::min(0.0, -before.dot(pair.normal));
     const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, depth_before, jump - before};
     return drag(pressing, friction, stiffness, k < face_grips_.size() ? face_grips_[k] : Grip{});
+}
+
+// A step to where, the wood taken for linear, each pair of faces that rub is open, grips or slides as its own law says: with
+// springs between all of them in place of what they are, so that the rest has a compliance, and by going from pair to pair
+// (friction.hpp). Newton's method alone goes round in circles where many of them change at a time.
+bool Equilibrium::sort_out_faces() {
+    std::vector<RubbingPlace> places;
+    std::vector<int> pairs;
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        if (!rubs(pair) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) continue;
+        const double stretch = k < face_grips_.size() ? face_grips_[k].stretch : 0.0;
+        pairs.push_back(static_cast<int>(k));
+        const double stiffness = closed_stiffness(pair);
+        places.push_back({pair.normal, stiffness, scene_.cracks[pair.crack].faces.coefficient,
+                          displacement_[pair.left] - displacement_[pair.right], settled_[pair.left] - settled_[pair.right], stretch,
+                          joint * stiffness});
+    }
+    joins_faces_ = true;
+    const bool made = factor_tangent(true) || factor_tangent(false);
+    joins_faces_ = false;
+    if (!made || pairs.empty()) return false;
+    const auto count = static_cast<Eigen::Index>(places.size());
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(out_of_balance().size(), 2 * count);  // forces that part the pairs
+    Eigen::VectorXd load = out_of_balance();
+    for (Eigen::Index i = 0; i < count; ++i)
+        for (int axis = 0; axis < 2; ++axis) {
+            const FieldPair& pair = cracks_.pairs[pairs[i]];
+            if (const int row = row_of(2 * pair.left + axis); row >= 0) unit(row, 2 * i + axis) += 1.0;
+            if (const int row = row_of(2 * pair.right + axis); row >= 0) unit(row, 2 * i + axis) -= 1.0;
+        }
+    for (Eigen::Index i = 0; i < count; ++i) load -= unit.middleCols<2>(2 * i) * places[i].force(Vec2::Zero());
+    const Eigen::MatrixXd yields = bordered_step(unit);
+    const Eigen::VectorXd without = bordered_step(load);
+    const Eigen::VectorXd forces = balance_of_rubbing(places, unit.transpose() * yields, unit.transpose() * without);
+    move(without + yields * forces, 1.0);
+    find_forces();
+    return true;
 }
 
 // What pressed faces put on the left one of each pair [N].

@@ -1,5 +1,6 @@
 #include "forward/friction.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 #include <algorithm>
@@ -49,6 +50,79 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     // slid).
     result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * slid;
     return result;
+}
+
+namespace {
+
+Drag drag_at(const RubbingPlace& place, const Vec2& step) {
+    const Vec2 apart = place.apart + step;
+    const double depth = -apart.dot(place.normal);
+    if (depth <= 0.0) return {};
+    const double before = std::min(0.0, -place.apart_before.dot(place.normal));
+    return drag({place.normal, 0.0, place.stiffness * depth, place.stiffness, depth, before, apart - place.apart_before},
+                place.coefficient, place.stiffness, {0, place.stretch});
+}
+
+// The step of a place that goes h + C x its own force.
+Vec2 step_of(const RubbingPlace& place, const Mat2& compliance, const Vec2& h, const Vec2& guess) {
+    const Vec2 n = place.normal, t = left_of(n);
+    Mat2 frame;
+    frame << n, t;
+    const Mat2 C = frame.transpose() * compliance * frame;
+    const Vec2 free = frame.transpose() * h;
+    const Vec2 apart = frame.transpose() * place.apart;
+    const double k = place.stiffness;
+    if (apart.x() + free.x() >= 0.0) return h;  // open
+    // How much of the way counts for friction, from the step before: it changes little.
+    const double before = place.apart_before.dot(n), depth = -(apart.x() + guess.dot(n));
+    const double share = before > 0.0 ? std::max(depth, 0.0) / (std::max(depth, 0.0) + before) : 1.0;
+    const double base = place.stretch + share * (apart.y() - place.apart_before.dot(t));
+    Mat2 grips = Mat2::Identity();
+    grips.col(0) += k * C.col(0);
+    grips.col(1) += k * share * C.col(1);
+    const Vec2 gripped = grips.inverse() * (free - C * Vec2(k * apart.x(), k * base));
+    const double normal = -k * (apart.x() + gripped.x()), along = -k * (base + share * gripped.y());
+    if (normal >= 0.0 && std::abs(along) <= place.coefficient * normal) return frame * gripped;
+    for (const double sign : {std::copysign(1.0, along), -std::copysign(1.0, along)}) {
+        const Vec2 way = C * Vec2(1.0, sign * place.coefficient);
+        const double force = -k * (apart.x() + free.x()) / (1.0 + k * way.x());
+        const Vec2 slid = free + way * force;
+        if (force >= 0.0 && -sign * k * (base + share * slid.y()) >= place.coefficient * force) return frame * slid;
+    }
+    return frame * gripped;
+}
+
+}  // namespace
+
+Vec2 RubbingPlace::force(const Vec2& step) const {
+    return std::max(0.0, -stiffness * (apart + step).dot(normal)) * normal + drag_at(*this, step).force;
+}
+
+Eigen::VectorXd balance_of_rubbing(const std::vector<RubbingPlace>& places, const Eigen::MatrixXd& compliance,
+                                   const Eigen::VectorXd& without) {
+    constexpr int most_rounds = 4000;
+    constexpr double settled = 1e-11;  // of the largest force
+    std::vector<Mat2> own(places.size()), freed(places.size());  // compliances; and without its joint's spring
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        own[i] = compliance.block<2, 2>(2 * i, 2 * i);
+        freed[i] = (Mat2::Identity() - places[i].joint * own[i]).inverse();
+    }
+    Eigen::VectorXd forces = Eigen::VectorXd::Zero(without.size());
+    Eigen::VectorXd steps = without;
+    for (int round = 0; round < most_rounds; ++round) {
+        double change = 0.0;
+        for (std::size_t i = 0; i < places.size(); ++i) {
+            const auto at = static_cast<Eigen::Index>(2 * i);
+            const Vec2 h = without.segment<2>(at) + compliance.middleRows<2>(at) * forces - own[i] * forces.segment<2>(at);
+            const Vec2 step = step_of(places[i], freed[i] * own[i], freed[i] * h, steps.segment<2>(at));
+            const Vec2 force = places[i].force(step) + places[i].joint * step;
+            change = std::max(change, (force - forces.segment<2>(at)).cwiseAbs().maxCoeff());
+            forces.segment<2>(at) = force;
+            steps.segment<2>(at) = step;
+        }
+        if (change <= settled * forces.cwiseAbs().maxCoeff()) break;
+    }
+    return forces;
 }
 
 Eigen::VectorXd solve_with_remainder(const Eigen::VectorXd& right,

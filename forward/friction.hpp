@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <functional>
+#include <vector>
 
 namespace crampfit {
 
@@ -41,6 +42,26 @@ struct Drag {
 
 /// `stiffness` of the spring in N/m.
 Drag drag(const Pressing& pressing, double coefficient, double stiffness, const Grip& before);
+
+/// A place on faces that rub, one of many that the wood joins.
+struct RubbingPlace {
+    Vec2 normal;
+    double stiffness = 0.0;    // along the normal and the surface, of what touches [N/m]
+    double coefficient = 0.0;  // of friction
+    Vec2 apart;                // how far the left face is from the right one [m]
+    Vec2 apart_before;         // in the state that was kept last [m]
+    double stretch = 0.0;      // of the spring along the surface, then [m]
+    double joint = 0.0;        // stiffness of a spring between the faces that the wood's compliance holds [N/m]
+
+    /// On the left face when it goes on so far against the right one [N].
+    Vec2 force(const Vec2& step) const;
+};
+
+/// Forces in N, [2 x places], those of the joints' springs added, that places put on their left faces where they go
+/// `without` + `compliance` x forces (m; m/N), each by its own law: by going from place to place, where a small problem has a
+/// solution of its own (nonlinear Gauss-Seidel; Jourdan, Alart and Jean 1998).
+Eigen::VectorXd balance_of_rubbing(const std::vector<RubbingPlace>& places, const Eigen::MatrixXd& compliance,
+                                   const Eigen::VectorXd& without);
 
 /// Solves (M + E) x = right, given x -> M^-1 x and x -> E x, where E is small against M (GMRES, Saad and Schultz 1986, with M as
 /// preconditioner from the right).

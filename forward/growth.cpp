@@ -113,20 +113,25 @@ bool steered_by_intensities(GrowthDirection criterion) {
 
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
                       double increment) {
-    switch (criterion) {
-    case GrowthDirection::straight:
+    constexpr double rounding = 1e-7;  // [rad]; a crack on a line of symmetry, often one of the grid, would leave it by a hair
+    const auto by_criterion = [&]() -> Vec2 {
+        switch (criterion) {
+        case GrowthDirection::straight:
+            return tip.direction;
+        case GrowthDirection::normal_to_opening:
+            return normal_to_opening(tip, load.opening);
+        case GrowthDirection::hoop_stress: {
+            const double angle =
+                materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);
+            return turned(tip.direction, angle).normalized();
+        }
+        case GrowthDirection::energy_release_rate:
+            return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
+        }
         return tip.direction;
-    case GrowthDirection::normal_to_opening:
-        return normal_to_opening(tip, load.opening);
-    case GrowthDirection::hoop_stress: {
-        const double angle =
-            materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);
-        return turned(tip.direction, angle).normalized();
-    }
-    case GrowthDirection::energy_release_rate:
-        return turned(tip.direction, weakest_angle(tip, load, materials, increment)).normalized();
-    }
-    return tip.direction;
+    };
+    const Vec2 direction = by_criterion();
+    return (direction - tip.direction).norm() < rounding ? tip.direction : direction;
 }
 
 }  // namespace crampfit

@@ -60,7 +60,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     : Quasistatic(scene, plan, materials, body, numbers, threads, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (plan.linear ? know_linear(0) : know(0, 0) && know(0, 1)) return;
-    if (outcome_ == Equilibrium::Outcome::mechanism)
+    if (outcome_ == Equilibrium::Outcome::mechanism || (coarse() && coarse()->outcome_ == Equilibrium::Outcome::mechanism))
         throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
     fail();
 }
@@ -268,8 +268,9 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
     outcome_ = equilibrium_.solve(time);
     if (outcome_ != Equilibrium::Outcome::solved) return false;
     const double change = equilibrium_.potential() - potential;
-    const double rounding = 1e-6 * std::abs(potential);
-    if (time == from) return change <= rounding;
+    const double rounding = 1e-6 * std::abs(potential) + equilibrium_.negligible_work();
+    // With friction the potential holds what has been dissipated, known to the trapezoid rule of a step.
+    if (time == from) return change <= (plan_.friction ? most_disagreement * std::abs(potential) : rounding);
     const double added = 0.5 * (power + equilibrium_.power()) * (time - from);
     if (power == 0.0) return change <= (1.0 + most_disagreement) * added + rounding;  // what comes to touch on the way adds less
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;

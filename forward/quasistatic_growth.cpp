@@ -125,7 +125,7 @@ bool Quasistatic::follow_leader(std::size_t place) {
         const Place& led = leader_->places_[places_.size()];
         if (next(led.parent, led.step, 0.0) < 0) return false;
     }
-    return true;
+    return !plan_.linear || !places_[place].states.empty();
 }
 
 // Lets these tips be the ones that move on from a place, and finds their routes. False where an equilibrium on the way is

@@ -1,7 +1,9 @@
 // Coulomb friction of bodies and of crack faces, and bodies that follow a force, against statics and exact solutions.
 #include "datasets/error.hpp"
+#include "forward/friction.hpp"
 #include "tests/forward/scenes.hpp"
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +11,9 @@
 #include <cstdio>
 #include <limits>
 #include <numbers>
+#include <random>
 #include <utility>
+#include <vector>
 
 namespace crampfit::test {
 namespace {
@@ -27,6 +31,48 @@ Body rough(std::string name, Shape shape, Vec2 velocity, double friction) {
 
 Vec2 push_of(const StaticTrial& run, int body) {
     return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
+}
+
+// Places joined by any compliance: what is found is each one's own law, and open, gripping and sliding ones are among them.
+TEST(UnitFriction, ManyPlacesEachFollowTheirLaw) {
+    std::mt19937 random(3);
+    const auto between = [&](double low, double high) { return low + (high - low) * 0x1p-32 * static_cast<double>(random()); };
+    int open = 0, grips = 0, slides = 0;
+    for (int trial = 0; trial < 50; ++trial) {
+        constexpr int count = 8;
+        const double k = 1e9, joint = 1e7;
+        Eigen::MatrixXd root(2 * count, 2 * count);
+        for (Eigen::Index i = 0; i < root.size(); ++i) root(i) = between(-1.0, 1.0);
+        const Eigen::MatrixXd wood = 2e7 * (root.transpose() * root + Eigen::MatrixXd::Identity(2 * count, 2 * count));  // N/m
+        const Eigen::MatrixXd compliance = (wood + joint * Eigen::MatrixXd::Identity(2 * count, 2 * count)).inverse();
+        std::vector<RubbingPlace> places;
+        Eigen::VectorXd without(2 * count);
+        for (int i = 0; i < count; ++i) {
+            const double angle = between(-3.0, 3.0);
+            places.push_back({.normal = {std::cos(angle), std::sin(angle)},
+                              .stiffness = k,
+                              .coefficient = between(0.1, 0.6),
+                              .apart = Vec2::Zero(),
+                              .apart_before = Vec2::Zero(),
+                              .stretch = 0.0,
+                              .joint = joint});
+            without.segment<2>(2 * i) << between(-1e-5, 1e-5), between(-1e-5, 1e-5);
+        }
+        const Eigen::VectorXd forces = balance_of_rubbing(places, compliance, without);
+        const Eigen::VectorXd steps = without + compliance * forces;
+        const double hair = 1e-8 * forces.norm();
+        for (int i = 0; i < count; ++i) {
+            const RubbingPlace& place = places[i];
+            const Vec2 step = steps.segment<2>(2 * i), force = forces.segment<2>(2 * i) - joint * step;
+            EXPECT_LT((force - place.force(step)).norm(), hair);
+            const double pressed = force.dot(place.normal), drag = std::abs(force.dot(left_of(place.normal)));
+            EXPECT_GE(pressed, -hair);
+            EXPECT_LE(drag, place.coefficient * pressed + hair);
+            (pressed <= hair ? open : drag < 0.999 * place.coefficient * pressed ? grips : slides)++;
+        }
+    }
+    std::printf("%d open, %d grip, %d slide\n", open, grips, slides);
+    EXPECT_GT(std::min({open, grips, slides}), 20);
 }
 
 // A block hangs from its top; a plate presses on its lower side with a force and goes aside by 1 mm a second, or follows a force.

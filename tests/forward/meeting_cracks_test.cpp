@@ -119,6 +119,24 @@ std::vector<Scene> cracks_at_random(int count) {
     return scenes;
 }
 
+// Pressed together or drawn apart, with faces that rub: Newton's method alone lost 4 of 5 of the pressed ones.
+TEST(HardMeeting, CracksAtRandomThatRubEndWell) {
+    constexpr int runs = 6;
+    for (const double way : {-1.0, 1.0}) {
+        int lost = 0;
+        for (Scene scene : cracks_at_random(runs)) {
+            scene.edges[0].velocity[1] = way * mm_per_minute;
+            for (Crack& crack : scene.cracks) {
+                crack.faces.kind = CrackFaces::Kind::friction;
+                crack.faces.coefficient = 0.3;
+            }
+            lost += simulate(scene).status == RunStatus::unstable;
+        }
+        hard_case(fmt::format("one to four cracks that rub, 6 scenes {}", way < 0.0 ? "pressed" : "drawn apart"),
+                  "each ends by itself", static_cast<double>(lost) / runs, 0.0);
+    }
+}
+
 TEST(HardMeeting, CracksAtRandomEndWell) {
     constexpr int runs = 60;
     int lost = 0;
@@ -211,16 +229,17 @@ TEST(HardMeeting, APlateCutInTwoBeforehandCarriesPressureAlone) {
 }
 
 TEST(HardMeeting, WhatFindsNoEquilibriumIsNotSaidToCarryNothing) {
-    // A wheel that stands a millimetre deep in the wood from the start.
+    // A wheel that goes nearly through.
     Scene scene = square({line({-1, 9.8}, {10, 9.8})});
     scene.edges[0].range = {{0.0, 4e-3}};
     scene.edges[0].velocity[1] = 0.0;
     Body wheel;
     wheel.name = "wheel";
-    wheel.shape = Circle{{10e-3, 20e-3}, 1e-3};
+    wheel.shape = Circle{{10e-3, 21e-3}, 1e-3};
     wheel.velocity = {0.0, -mm_per_minute};
     scene.bodies = {wheel};
     scene.measure = {"wheel", "wheel"};
+    scene.stop.displacement = 18e-3;
     EXPECT_EQ(simulate(scene).status, RunStatus::unstable);
 }
 
