@@ -10,7 +10,7 @@ namespace crampfit {
 namespace {
 
 // The ends of a stretch that is shorter are not seen on their own.
-constexpr double least_cells_between_ends = 4.0;
+constexpr double least_cells_between_ends = 1.0;
 
 bool on_side(const Layout& layout, Side side, const Vec2& x) {
     const Vec2 near = 1e-6 * layout.cell;
@@ -36,10 +36,16 @@ bool in_range(const Layout& layout, const Edge& edge, const Vec2& x) {
     return x[axis] >= edge.range->first - rounding && x[axis] <= edge.range->second + rounding;
 }
 
-Shape widened(const Shape& shape, double by) {
-    Shape wide = shape;
-    if (auto* circle = std::get_if<Circle>(&wide)) circle->radius += by;
-    return wide;
+// Whether a bonded body holds a node: one in it, and one that its outline passes by less than half a cell, through wood. So what it
+// holds ends as often before its outline as behind it.
+bool holds_node(const Shape& shape, const SpecimenPlan& specimen, const Vec2& x, double cell) {
+    const double hair = 1e-6 * cell;
+    if (inside(shape, x)) return true;
+    const OutlinePoint on = nearest_on_outline(shape, x);
+    if (on.distance <= hair) return true;
+    if (on.distance >= 0.5 * cell - hair) return false;
+    const Vec2 beside = on.position + hair / on.distance * (x - on.position);
+    return beside.minCoeff() >= -hair && (specimen.size - beside).minCoeff() >= -hair && has_wood(specimen, beside);
 }
 
 }  // namespace
@@ -178,10 +184,10 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Body& grip = scene_.bodies[b];
         if (grip.contact.kind != Contact::Kind::bonded) continue;
-        const Shape shape = widened(grip.shape, 1e-6 * layout.cell.minCoeff());
         int found = 0;
         for (int n = 0; n < layout.nodes(); ++n) {
-            if (mass[n] == 0.0 || !inside(shape, layout.node_position(n))) continue;
+            if (mass[n] == 0.0 || !holds_node(grip.shape, scene_.specimen, layout.node_position(n), layout.cell.minCoeff()))
+                continue;
             ++found;
             for (int axis = 0; axis < 2; ++axis) hold(n, axis, edges_ + static_cast<int>(b));
         }

@@ -1,4 +1,5 @@
 // Stretches of a side that end in wood, wherever that is in a cell.
+#include "datasets/error.hpp"
 #include "tests/forward/scenes.hpp"
 
 #include <gtest/gtest.h>
@@ -74,6 +75,52 @@ TEST(VerificationHeldStretch, OfAClampConverges) {
         std::printf("clamp on %.2f mm cells: %+.2f %%\n", 1e3 * cell, 100 * off);
         EXPECT_LT(std::abs(off), bar);
     }
+}
+
+// A short clamp is one on the second grid, too, whose cells are twice as wide.
+TEST(VerificationHeldStretch, OfAShortClampConverges) {
+    const auto clamped = [](double length, double cell) {
+        Scene scene = upper_half(10e-3 - length, cell);
+        scene.edges[1].velocity[0] = 0.0;
+        return force(scene);
+    };
+    for (const double length : {1.3e-3, 1.8e-3, 2.4e-3, 3.1e-3, 3.7e-3}) {
+        const double off = clamped(length, 0.5e-3) / clamped(length, 0.125e-3) - 1;
+        std::printf("clamp of %.1f cells: %+.2f %%\n", length / 0.5e-3, 100 * off);
+        EXPECT_LT(std::abs(off), 0.012);
+    }
+}
+
+// Grips whose faces lie on lines of the grid are a shorter specimen's edges.
+TEST(VerificationHeldStretch, GripsOnGridLinesAreEdges) {
+    Scene held = upper_half(4e-3, 0.5e-3);
+    held.edges = {moving("top", Side::top, {0.0, speed}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Scene gripped = held;
+    gripped.specimen.size.y() = 14e-3;
+    gripped.edges.clear();
+    const auto grip = [](const char* name, double low, Vec2 velocity) {
+        Body made;
+        made.name = name;
+        made.shape = Polygon{{{-1e-3, low}, {11e-3, low}, {11e-3, low + 3e-3}, {-1e-3, low + 3e-3}}};
+        made.contact.kind = Contact::Kind::bonded;
+        made.velocity = velocity;
+        return made;
+    };
+    for (const double off : {-0.2e-3, 0.0, 0.2e-3}) {  // the nearest line of the grid holds
+        gripped.bodies = {grip("top", 12e-3 + off, {0.0, speed}), grip("bottom", -1e-3 + off, {0.0, 0.0})};
+        EXPECT_NEAR(force(gripped) / force(held), 1.0, 1e-9) << off;
+    }
+}
+
+// What does not touch the wood does not hold it, however near.
+TEST(UnitHeldStretch, AGripBesideTheWoodHoldsNothing) {
+    Scene scene = upper_half(4e-3, 0.5e-3);
+    Body plate;
+    plate.name = "plate";
+    plate.contact.kind = Contact::Kind::bonded;
+    plate.shape = Polygon{{{-1e-3, 10.1e-3}, {11e-3, 10.1e-3}, {11e-3, 12e-3}, {-1e-3, 12e-3}}};
+    scene.bodies = {plate};
+    EXPECT_THROW(simulate(scene), InputError);
 }
 
 TEST(UnitHeldStretch, NextToAnotherOneHoldsOn) {

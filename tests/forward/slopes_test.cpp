@@ -37,18 +37,18 @@ Scene wedge_across_rings(double cell) {
     scene.specimen.rings->pith = {5e-3, 30e-3};
     scene.specimen.cutouts = {Polygon{{{3.5e-3, 10e-3}, {6.5e-3, 10e-3}, {5e-3, 7e-3}}}};
     scene.edges.clear();
-    const auto body = [](const char* name, Vec2 centre, Contact::Kind contact, Vec2 velocity) {
+    const auto body = [](const char* name, Vec2 centre, double radius, Contact::Kind contact, Vec2 velocity) {
         Body made;
         made.name = name;
-        made.shape = Circle{centre, 0.5e-3};
+        made.shape = Circle{centre, radius};
         made.contact.kind = contact;
         made.velocity = velocity;
         return made;
     };
     const Vec2 down(0.0, -1e-3 / 60.0);
-    scene.bodies = {body("left", {4.4472e-3, 9.2236e-3}, Contact::Kind::frictionless, down),
-                    body("right", {5.5528e-3, 9.2236e-3}, Contact::Kind::frictionless, down),
-                    body("pin", {5e-3, 0.0}, Contact::Kind::bonded, Vec2::Zero())};
+    scene.bodies = {body("left", {4.4472e-3, 9.2236e-3}, 0.5e-3, Contact::Kind::frictionless, down),
+                    body("right", {5.5528e-3, 9.2236e-3}, 0.5e-3, Contact::Kind::frictionless, down),
+                    body("pin", {5e-3, 0.0}, 0.4e-3, Contact::Kind::bonded, Vec2::Zero())};
     scene.cracks[0].points = {{5e-3, 7e-3}, {5e-3, 5.9e-3}};
     scene.measure = {"pin", "left"};
     scene.stop.displacement = 0.8e-3;
