@@ -76,6 +76,26 @@ bool crosses_itself(const std::vector<Vec2>& points, bool closed) {
     return false;
 }
 
+bool share_a_stretch(const std::vector<Vec2>& line, const std::vector<Vec2>& other) {
+    constexpr double hair = 1e-9;  // of a segment
+    for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+        const Vec2 way = line[i + 1] - line[i];
+        const double squared = way.squaredNorm();
+        for (std::size_t j = 0; j + 1 < other.size(); ++j) {
+            const Vec2 from = other[j] - line[i], to = other[j + 1] - line[i];
+            if (std::max(std::abs(cross(way, from)), std::abs(cross(way, to))) > hair * squared) {
+                continue;
+            }
+            const double first = std::min(way.dot(from), way.dot(to)) / squared;
+            const double last = std::max(way.dot(from), way.dot(to)) / squared;
+            if (std::min(last, 1.0) - std::max(first, 0.0) > hair) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 bool meets_rectangle(const std::vector<Vec2>& line, const Vec2& size) {
     constexpr double rounding = 1e-9;  // of the size
     // Each segment is a + s (b - a), 0 <= s <= 1; the rectangle's four sides cut that stretch of s down (Liang and

@@ -217,6 +217,11 @@ std::vector<Crack> read_cracks(const Entry& cracks, const Vec2& specimen_size) {
     std::vector<Crack> result;
     for (const Entry& crack : cracks.list()) {
         result.push_back(read_crack(crack, specimen_size));
+        for (std::size_t k = 0; k + 1 < result.size(); ++k) {
+            if (share_a_stretch(result[k].points, result.back().points)) {
+                crack.at("points").fail(fmt::format("lies on cracks.{} for a stretch: cracks may cross or touch, no more", k));
+            }
+        }
     }
     return result;
 }

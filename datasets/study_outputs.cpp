@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 #include <stdexcept>
 
 namespace crampfit {
@@ -113,14 +114,15 @@ std::vector<StudyOutput> read_output(const Entry& entry, const Study& study) {
 
 std::vector<StudyOutput> read_outputs(const Entry& list, const Study& study) {
     std::vector<StudyOutput> outputs;
+    std::set<std::string> asked;
     for (const Entry& entry : list.list()) {
-        for (const StudyOutput& output : read_output(entry, study)) {
-            const bool twice =
-                std::any_of(outputs.begin(), outputs.end(), [&](const StudyOutput& other) { return other.name == output.name; });
-            if (twice) {
-                entry.fail(fmt::format("\"{}\" is asked for twice", output.name));
+        if (!asked.insert(entry.text()).second) {
+            entry.fail(fmt::format("\"{}\" is asked for twice", entry.text()));
+        }
+        for (const StudyOutput& output : read_output(entry, study)) {  // may be a point of a curve that is asked for, too
+            if (std::ranges::none_of(outputs, [&](const StudyOutput& other) { return other.name == output.name; })) {
+                outputs.push_back(output);
             }
-            outputs.push_back(output);
         }
     }
     if (outputs.empty()) {

@@ -256,16 +256,6 @@ void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, con
     for (int i = 0; i < static_cast<int>(place_.size()); ++i) place_[i] = current(i, displacement) - moved;
 }
 
-double SlidingBody::deepest(const std::vector<Vec2>& displacement) const {
-    double most = 0.0;
-    for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
-        double depth = 0.0, curvature = 0.0;
-        Vec2 out;
-        if (depth_in(shape_, current(i, displacement), depth, out, curvature)) most = std::max(most, depth);
-    }
-    return most;
-}
-
 void SlidingBody::let_yield(std::shared_ptr<LocalYield> yield) {
     if (!yield) return;
     yield_ = std::move(yield);

@@ -74,9 +74,6 @@ class SlidingBody {
     const std::vector<Grip>& grips() const { return grips_; }
     void restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement);
 
-    /// Deepest that any facet lies in the body where it stands [m].
-    double deepest(const std::vector<Vec2>& displacement) const;
-
   private:
     double may_go() const;
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);

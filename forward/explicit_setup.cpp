@@ -1,7 +1,5 @@
-#include "datasets/error.hpp"
 #include "forward/explicit.hpp"
 
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,13 +13,6 @@ void ExplicitSolver::place_bodies() {
         if (rigid.contact.kind == Contact::Kind::bonded) continue;
         SlidingBody sliding(rigid.shape, body_, rigid.contact.coefficient);
         sliding.limit_frequency(mass_, plan_.added_frequency_squared);
-        const double depth = std::max(sliding.deepest(displacement_), 0.0);
-        const bool swallows = std::any_of(body_.points.position.begin(), body_.points.position.end(), [&](const Vec2& x) {
-            return inside(rigid.shape, x) && nearest_on_outline(rigid.shape, x).distance > body_.layout.cell.maxCoeff();
-        });
-        if (swallows || depth > body_.layout.cell.maxCoeff())
-            throw InputError(scene_.file.string(), "bodies." + rigid.name, fmt::format("overlap of {:.3g} mm", depth * 1e3),
-                             "a sliding body must not overlap the specimen at the start");
         sliding_.push_back(std::move(sliding));
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
     }

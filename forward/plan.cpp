@@ -140,6 +140,20 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
                    "\"quasistatic\", or give its velocity");
 }
 
+// What slides must not lie in the wood at the start; what it touches may be off by what the points of cut cells are.
+void check_bodies(const Scene& scene, const Discretisation& body) {
+    const double hair = 0.05 * body.layout.cell.minCoeff();
+    for (const Body& rigid : scene.bodies) {
+        if (rigid.contact.kind == Contact::Kind::bonded) continue;
+        double depth = 0.0;
+        for (const Vec2& x : body.points.position)
+            if (inside(rigid.shape, x)) depth = std::max(depth, nearest_on_outline(rigid.shape, x).distance);
+        if (depth > hair)
+            refuse(scene, "bodies." + rigid.name, fmt::format("overlap of {:.3g} mm", 1e3 * depth),
+                   "a sliding body must not overlap the specimen at the start");
+    }
+}
+
 // Highest squared frequency that any point can take part in: with the point as an element of its own, its stiffness over its
 // share of the nodes' mass. No way of joining the points, so no crack, exceeds it (Irons and Treharne 1971).
 double highest_frequency_squared(const Discretisation& body) {
@@ -277,6 +291,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                        (scene.solver.kind == SolverKind::automatic && scene.solver.damping == 0.0 && !starts_in_motion(scene) &&
                         !bridged && (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
+    check_bodies(scene, body);
     if (!may_end(scene))
         refuse(scene, "stop",
                scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
@@ -309,8 +324,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies                         ? "a body that follows a force is in equilibrium with the specimen"
         : bridged ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
-        : starts_in_motion(scene)
-            ? "a part starts in motion"
+        : starts_in_motion(scene)   ? "a part starts in motion"
+        : scene.solver.damping > 0.0 ? "solver.damping is given, and equilibrium has no motion to damp"
             : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness,
                           slow_loading);
     if (plan.quasistatic)
@@ -404,7 +419,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (plan.friction)
         choose("friction", "Coulomb, of bodies or crack faces that press",
                plan.quasistatic ? "slip counts from one equilibrium to the next; Newton's method takes its unsymmetric tangent "
-                                  "by iteration on the symmetric part"
+                                  "by iteration on the symmetric part, and crack faces are sorted into those that grip and slide "
+                                  "where it goes round in circles"
                                 : "asked for");
     if (plan.free_bodies) choose("free bodies", "follow their force", "one more unknown for each free component");
     if (plan.quasistatic) return plan;

@@ -51,15 +51,24 @@ const Instant& instant_of_frame(const Record& record, int frame, int frames) {
     return found == record.series.end() ? record.series.back() : *found;
 }
 
+bool is_stopped(const SimulateOptions& options) {
+    return options.stop_requested && options.stop_requested->load(std::memory_order_relaxed);
+}
+
 // Frames at even times.
 void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
-                 Quasistatic& walk, Record& record) {
+                 Quasistatic& walk, const SimulateOptions& options, Record& record) {
     Revisit revisit(scene, plan, materials, body, walk);
     record.point_position = revisit.body().points.position;
     record.point_size = revisit.body().layout.point_size();
     record.point_latewood = revisit.body().points.latewood;
     const TrackedTip tracked = tracked_tip(scene);
     for (int k = 0; k < scene.output.frames; ++k) {
+        if (is_stopped(options)) {
+            if (record.status != RunStatus::interrupted) record.message += "; stopped by the user before all frames were drawn";
+            record.status = RunStatus::interrupted;
+            return;
+        }
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
         if (!revisit.to(record, {static_cast<std::size_t>(&instant - record.series.data()), 0.0})) return;
         record.frames.push_back(make_frame(scene, plan, revisit.body(), revisit.equilibrium().displacements()));
@@ -121,6 +130,39 @@ void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSol
                         *at);
 }
 
+// A crack that goes out through a side is shown to end there: solvers let its tip go on a little.
+void end_at_sides(const Scene& scene, Record& record) {
+    const Box box{Vec2::Zero(), scene.specimen.size};
+    const auto outside = [&](const Vec2& x) { return (box.low - x).maxCoeff() > 0.0 || (x - box.high).maxCoeff() > 0.0; };
+    const auto end_at = [&](std::vector<Vec2> way, const auto& replace) {  // from the tip back
+        while (way.size() > 2 && outside(way[1])) way.erase(way.begin());
+        if (way.size() < 2 || !outside(way[0]) || outside(way[1])) return;
+        const Vec2 direction = (way[0] - way[1]).normalized();
+        if (const auto leave = exit_distance(way[1], direction, box)) way[0] = way[1] + *leave * direction;
+        replace(way);
+    };
+    for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
+        for (const bool at_end : {false, true}) {
+            if (scene.cracks[k].grows != Growth::both && scene.cracks[k].grows != (at_end ? Growth::end : Growth::start)) continue;
+            std::vector<Vec2>& path = record.paths[k];
+            std::vector<Vec2> back = path;
+            if (at_end) std::ranges::reverse(back);
+            end_at(back, [&](std::vector<Vec2> way) {
+                const Vec2 tip = way[0];
+                if (at_end) std::ranges::reverse(way);
+                path = way;
+                if (at_end != (scene.cracks[k].grows != Growth::start)) return;  // not the end that the tables show
+                if (k == record.tracked_crack) {
+                    for (Instant& row : record.series)
+                        if (outside(row.tip)) row.tip = tip;
+                } else {
+                    for (Vec2& x : record.cracks[k - (k > record.tracked_crack)].tip)
+                        if (outside(x)) x = tip;
+                }
+            });
+        }
+}
+
 // Says so where the energy books do not close, as they do to a hundredth on any scene that the grid resolves.
 void judge_books(Record& record) {
     constexpr double counts = 0.05;
@@ -138,7 +180,7 @@ Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& mate
             crack_length += (scene.cracks[crack].points[k + 1] - scene.cracks[crack].points[k]).norm();
     return march(scene, plan, materials, body, options.threads, [&](double time) {
         if (options.progress) options.progress({std::clamp(time / plan.end_time, 0.0, 1.0), time, crack_length, step++});
-        return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
+        return !is_stopped(options);
     });
 }
 
@@ -151,12 +193,12 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
             const double by_length = scene.stop.crack_length ? crack_length / *scene.stop.crack_length : 0.0;
             options.progress({std::clamp(std::max(by_time, by_length), 0.0, 1.0), time, crack_length, walk.equilibria()});
         }
-        return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
+        return !is_stopped(options);
     };
     Record record = trace(scene, plan, materials, walk, go_on);
     record.steps = walk.equilibria();
     record.points = walk.points();
-    if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, record);
+    if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, options, record);
     read_probes(scene, walk, record);
     if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, body, walk, record);
     return record;
@@ -180,7 +222,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
             recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface or another crack");
             break;
         }
-        if (options.stop_requested && options.stop_requested->load(std::memory_order_relaxed)) {
+        if (is_stopped(options)) {
             recorder.finish(RunStatus::interrupted, "stopped by the user");
             break;
         }
@@ -219,6 +261,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     Record record = !plan.quasistatic ? run_explicit(scene, plan, materials, body, options)
                     : plan.remembers  ? run_in_time(scene, plan, materials, body, options)
                                       : run_quasistatic(scene, plan, materials, body, options);
+    end_at_sides(scene, record);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);
     if (!plan.quasistatic)

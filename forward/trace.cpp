@@ -62,7 +62,7 @@ class Tracer {
            const std::function<bool(double, double)>& go_on)
         : scene_(scene), plan_(plan), materials_(materials), walk_(walk), go_on_(go_on), gauges_(scene),
           tracked_(tracked_tip(scene)) {
-        sample_ = (std::isfinite(plan.end_time) ? plan.end_time : 1.0) / scene.output.samples;
+        sample_ = plan.end_time / scene.output.samples;
         for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
         for (const Body& body : scene.bodies) record_.reactions.push_back({body.name, {}});
         record_.cracks.resize(scene.cracks.size());
@@ -104,6 +104,8 @@ class Tracer {
         fracture_energy_.push_back(spent);
         const Quasistatic::Critical found = walk_.critical(i, materials_, now);
         critical_.push_back(found.time);
+        // Where nothing tells the end, half of the rows come before the crack grows, and as many each time that lasts once more.
+        if (!std::isfinite(sample_) && found.time > 0.0) sample_ = 2.0 * found.time / scene_.output.samples;
         toughness_.push_back(found.toughness);
         list_driving(i, found, now);
         return walk_.failure().empty();
@@ -268,7 +270,8 @@ class Tracer {
     }
 
     // There is one where all motion ends: power goes in a step there.
-    double next_sample(double time) const {
+    double next_sample(double time) {
+        while (!std::isfinite(end_time()) && time >= sample_ * scene_.output.samples) sample_ *= 2.0;
         const double next = (std::floor(time / sample_ + rounding) + 1.0) * sample_;
         return moves_at(time) ? std::min(next, plan_.still_from) : next;
     }

@@ -240,6 +240,18 @@ TEST(UnitScene, FileOnDisk) {
     expect_error((folder / "none.toml").string(), "", "no such file", [&] { read_scene(folder / "none.toml"); });
 }
 
+TEST(UnitScene, CracksMayCrossOrTouchButNotLieOnEachOther) {
+    const SceneFolder folder;
+    const std::string first = "\n[[cracks]]\npoints = [[\"0 mm\", \"5 mm\"], [\"4 mm\", \"5 mm\"]]\n";
+    const auto with = [&](const std::string& points) { return plain_scene + first + "[[cracks]]\npoints = " + points + "\n"; };
+    for (const char* points : {"[[\"0 mm\", \"5 mm\"], [\"4 mm\", \"5 mm\"]]", "[[\"5 mm\", \"5 mm\"], [\"3 mm\", \"5 mm\"]]",
+                               "[[\"2 mm\", \"2 mm\"], [\"2 mm\", \"5 mm\"], [\"3 mm\", \"5 mm\"]]"})
+        expect_error((folder / "scene.toml").string(), "cracks.1.points", "lies on cracks.0", [&] { folder.parse(with(points)); });
+    for (const char* points : {"[[\"4 mm\", \"5 mm\"], [\"6 mm\", \"5 mm\"]]", "[[\"2 mm\", \"2 mm\"], [\"2 mm\", \"8 mm\"]]",
+                               "[[\"0 mm\", \"5.1 mm\"], [\"4 mm\", \"5.1 mm\"]]"})
+        EXPECT_EQ(folder.parse(with(points)).cracks.size(), 2u);
+}
+
 TEST(UnitScene, SyntaxErrorHasLineAndColumn) {
     const SceneFolder folder;
     expect_error((folder / "scene.toml").string(), "", "line 2, column ", [&] { folder.parse("a = 1\nb = = 2\n"); });

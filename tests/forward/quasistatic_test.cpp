@@ -375,6 +375,39 @@ TEST(UnitWalk, ACrackLengthAloneStopsIt) {
     }
 }
 
+// Rows are some, about as many as asked for, however slow the load.
+TEST(UnitWalk, RowsOfARunThatItsCrackLengthEndsDoNotHangOnTheSpeed) {
+    std::vector<std::size_t> rows;
+    for (const double speed : {1.0, 1e-3}) {  // of 1 mm a minute
+        Scene scene = rings_walk();
+        for (Edge& edge : scene.edges)
+            for (auto& v : edge.velocity) *v *= speed;
+        scene.output.samples = 100;
+        scene.stop.displacement.reset();
+        scene.stop.crack_length = 6.5e-3;
+        rows.push_back(simulate(scene).series.size());
+    }
+    EXPECT_EQ(rows[0], rows[1]);
+    EXPECT_GE(rows[0], 50u);
+    EXPECT_LE(rows[0], 600u);
+}
+
+// Where a crack goes out, its tip and its path end at the side.
+TEST(UnitWalk, APathEndsAtTheSideThatItGoesOutBy) {
+    Scene scene = rings_walk();
+    scene.cracks[0].direction = GrowthDirection::straight;
+    scene.cracks[0].points[1].y() += 0.3e-3;
+    scene.stop.displacement = 5e-3;
+    const Record record = simulate(scene);
+    ASSERT_EQ(record.status, RunStatus::split) << record.message;
+    const Vec2 from = scene.cracks[0].points[0], way = scene.cracks[0].points[1] - from;
+    const double whole = scene.specimen.size.x() / std::abs(way.x());
+    const Vec2 out = from + whole * way;
+    EXPECT_LT((record.paths[0].back() - out).norm(), 1e-9);
+    EXPECT_LT((record.series.back().tip - out).norm(), 1e-9);
+    EXPECT_NEAR(record.series.back().crack_length, whole * way.norm(), 1e-9);
+}
+
 TEST(UnitWalk, LoadGoesWithTheRootOfToughness) {
     // G goes with the square of the load at given crack length: all toughnesses times s, all critical loads times sqrt(s).
     Scene scene = rings_walk();
