@@ -21,7 +21,7 @@ constexpr double errors_wide = 12;       // half width in standard errors: a dif
 constexpr double agreement = 1.4;        // of a window with the errors that it finds
 constexpr int most_rounds = 10;
 constexpr int points_a_parameter = 12;  // of a spread
-constexpr int most_profiles = 4;        // in windows of rising width
+constexpr int most_profiles = 8;        // in windows of rising width
 constexpr double rounding = 1e-9;       // of the box
 constexpr double as_good = 0.02;        // of the misfit, in what the noise explains: a seventh of a standard error
 constexpr int most_descents = 4;        // from lower points that looks come upon
@@ -131,7 +131,8 @@ bool take_profile(CloseLook& look) {
             constexpr double coarse = 0.1;  // of the window: twice the profile's steps
             const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
             const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
-            if (ends.first <= 0.0 || ends.second >= 1.0) {
+            const bool from_bound = way.window.origin[j] < rounding, to_bound = way.window.origin[j] + scale > 1.0 - rounding;
+            if ((ends.first <= 0.0 && !from_bound) || (ends.second >= 1.0 && !to_bound)) {
                 return false;
             }
             below = (way.best.x[0] - ends.first) * scale;

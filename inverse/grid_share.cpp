@@ -23,6 +23,13 @@ constexpr double resolved = 1e-3;
 // cell, nor slopes at the best point for the way there.
 constexpr double farthest_told = 0.1;
 
+// Of a toughness: what is left where two grids happen to agree.
+constexpr double least_of_toughness = 0.01;
+
+bool is_toughness(const Parameter& parameter) {
+    return std::ranges::any_of(parameter.keys, [](const std::string& key) { return key.ends_with(".toughness"); });
+}
+
 bool has_two_grids(const Experiment& experiment) { return KeptWalk(experiment.scene).extrapolates(); }
 
 // What a parameter's shifts are large or small beside, SI: its value, and where that may be near 0 half of its box.
@@ -74,7 +81,7 @@ Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorX
 
 }  // namespace
 
-GridShare left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
     const Eigen::VectorXd values = model.box().values(best.x);
     Evaluation here = *best.evaluation;
     const std::vector<FitResidual> before = model.residuals(here);
@@ -82,13 +89,10 @@ GridShare left_by_grid(const Study& study, StudyModel model, const Run& best, Ev
     model.weigh(here, values);
     model.weigh(wide, values);
     const std::vector<FitResidual> after = model.residuals(here);
-    GridShare grid{.left = {}, .one_way = true};
     std::map<std::string, double> share;
     for (const Experiment& experiment : study.experiments) {
         // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
-        const bool two = has_two_grids(experiment);
-        share[experiment.name] = two ? 0.75 : 1.0;
-        grid.one_way = grid.one_way && two;
+        share[experiment.name] = has_two_grids(experiment) ? 0.75 : 1.0;
     }
     Eigen::VectorXd change = wide.residuals - here.residuals;
     Eigen::MatrixXd slope = about.slope;
@@ -97,12 +101,10 @@ GridShare left_by_grid(const Study& study, StudyModel model, const Run& best, Ev
         slope.row(row) *= before[i].sigma / after[i].sigma;
         change[row] *= share.at(before[i].experiment);
     }
-    grid.left = least_squares(slope, change);
-    return grid;
+    return least_squares(slope, change);
 }
 
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const GridShare& grid) {
-    const auto& [left, one_way] = grid;
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left) {
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
     bool is_near = true;
@@ -115,6 +117,9 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
         is_near = is_near && std::abs(shifts[j]) <= farthest_told * size_of(parameter, values[j]);
         told.push_back(shift_text(parameter, values[j], shifts[j]));
     }
+    if (told.empty()) {
+        return;
+    }
     if (!is_near) {
         const std::string why = "a fit on cells twice as wide, which would tell it, lies too far off: ";
         take_in_untold_grid(fit, box, x, why + fmt::format("{}", fmt::join(told, ", ")));
@@ -123,12 +128,13 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     Eigen::VectorXd own(box.size());  // in the parameters' units
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
-        if (!one_way || left[j] < 0) {
-            go_on(box, j, fitted.lower_95, -std::abs(left[j]));
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        if (is_toughness(parameter)) {
+            const double least = least_of_toughness * values[j] / box.slope(j, x[j]);
+            left[j] = std::copysign(std::max(std::abs(left[j]), least), left[j]);
         }
-        if (!one_way || left[j] > 0) {
-            go_on(box, j, fitted.upper_95, std::abs(left[j]));
-        }
+        go_on(box, j, fitted.lower_95, -std::abs(left[j]));
+        go_on(box, j, fitted.upper_95, std::abs(left[j]));
         own[j] = slope_in_unit(box, j, x) * left[j];
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
@@ -136,8 +142,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const 
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
     fit.message +=
         fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
-                    "Intervals take that in {}; it makes up to {:.0f} % of a variance. ",
-                    fmt::join(told, ", "), one_way ? "on its side" : "on both sides", 100 * most);
+                    "Intervals take that in on both sides, of a toughness 1 % at least; it makes up to {:.0f} % of a variance. ",
+                    fmt::join(told, ", "), 100 * most);
 }
 
 void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why) {

@@ -4,10 +4,12 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace crampfit {
 namespace {
@@ -37,6 +39,46 @@ double slope(std::span<const double> at, std::span<const double> values) {
     return coefficients[0] / difference_step;
 }
 
+// The neighbours that a jump of the function parts from 0 are left out: between two points that follow each other it changes
+// otherwise than between all others, which agree, and by more than this part of the function's value. Whether there was one.
+bool drop_beyond_jump(std::vector<double>& at, std::vector<double>& change, double value) {
+    constexpr double spreads = 5.0, part = 0.2, least = 1e-5;
+    if (at.size() < points_a_parameter) {
+        return false;
+    }
+    std::vector<std::pair<double, double>> line{{0.0, 0.0}};
+    for (std::size_t k = 0; k < at.size(); ++k) {
+        line.emplace_back(at[k], change[k]);
+    }
+    std::ranges::sort(line);
+    std::vector<double> slopes;
+    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+        slopes.push_back((line[k + 1].second - line[k].second) / (line[k + 1].first - line[k].first));
+    }
+    for (std::size_t k = 0; k < slopes.size(); ++k) {
+        std::vector<double> others = slopes;
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+        const auto [low, high] = std::ranges::minmax(others);
+        const double off = std::max(low - slopes[k], slopes[k] - high);
+        if (off <= spreads * (high - low) || off <= part * std::max(std::abs(low), std::abs(high)) ||
+            off * (line[k + 1].first - line[k].first) <= least * std::abs(value)) {
+            continue;
+        }
+        const double before = line[k].first, after = line[k + 1].first;
+        std::vector<double> kept_at, kept_change;
+        for (std::size_t i = 0; i < at.size(); ++i) {
+            if (after > 0 ? at[i] <= before : at[i] >= after) {
+                kept_at.push_back(at[i]);
+                kept_change.push_back(change[i]);
+            }
+        }
+        at = kept_at;
+        change = kept_change;
+        return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 LocalDesign::LocalDesign(const Eigen::VectorXd& x) : points_{x} {
@@ -48,7 +90,7 @@ LocalDesign::LocalDesign(const Eigen::VectorXd& x) : points_{x} {
     }
 }
 
-std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values) const {
+std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values, bool* jumps) const {
     assert(values.size() == points_.size());
     std::vector<Estimate> derivatives;
     const auto parameters = static_cast<std::size_t>(points_.front().size());
@@ -59,6 +101,10 @@ std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values) c
                 at.push_back((points_[k] - points_[0])[static_cast<Eigen::Index>(j)]);
                 change.push_back(values[k] - values[0]);
             }
+        }
+        const bool jumped = drop_beyond_jump(at, change, values[0]);
+        if (jumps) {
+            *jumps = *jumps || jumped;
         }
         if (at.size() < 2) {
             constexpr double unknown = std::numeric_limits<double>::quiet_NaN();

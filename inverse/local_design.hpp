@@ -22,8 +22,9 @@ class LocalDesign {
 
     /// Of the function's values at the points [points], the derivatives by x [parameters]. The interval is what two
     /// points less would change: the polynomial's own error and the noise of the function. Points that are not a number
-    /// are left out; not a number where less than three are left.
-    std::vector<Estimate> derivatives(std::span<const double> values) const;
+    /// are left out, and so are those beyond a jump of the function, which is then told; not a number where less than three
+    /// are left.
+    std::vector<Estimate> derivatives(std::span<const double> values, bool* jumps = nullptr) const;
 
   private:
     std::vector<Eigen::VectorXd> points_;

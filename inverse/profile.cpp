@@ -118,7 +118,7 @@ std::pair<double, double> interval(const Profile& profile, double least, double 
 
 std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
                                   const Eigen::VectorXd& valley, double least, double rise) {
-    constexpr int most_trials = 8;
+    constexpr int most_trials = 16;
     constexpr double farthest = 2.0;  // of the distance before
     const double level = std::sqrt(rise);
     double inside = 0, height_inside = 0;

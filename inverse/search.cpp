@@ -78,7 +78,9 @@ std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const 
 
 SearchResult search_automatically(Objective& objective, int starts, const Eigen::VectorXd& initial, unsigned seed,
                                   const Stage& stage) {
-    constexpr double explained = 4;  // reduced chi-square: residuals of two sigma
+    constexpr double explained = 1.3;  // reduced chi-square: as far above 1 as noise goes
+    constexpr double unexplained = 4;  // residuals of two sigma
+    constexpr int least_where_unexplained = 4;
     const int p = static_cast<int>(initial.size());
     const int count = std::max(starts, 2 * p + 2);
     stage("starts");
@@ -89,7 +91,8 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
     std::string ends;
     std::vector<Eigen::VectorXd> seen;
     stage("descent");
-    for (int i = 0; i < starts && !objective.exhausted(); ++i) {
+    int descents = starts;
+    for (int i = 0; i < descents && !objective.exhausted(); ++i) {
         const auto start = next_start(tried, seen);
         if (!start) {
             break;
@@ -107,9 +110,11 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
             result.converged = solution.converged;
         }
         ends += fmt::format(" Descent {}: {}.", i + 1, solution.message);
-        if (solution.converged && reduced_chi_square(*objective.best()->evaluation, p) < explained) {
+        const double left = reduced_chi_square(*objective.best()->evaluation, p);
+        if (solution.converged && left < explained) {
             break;
         }
+        descents = left > unexplained ? std::max(starts, least_where_unexplained) : starts;
     }
     result.method = fmt::format("auto: {} starting points side by side, then steps from the best of them to the least "
                                 "misfit (Ceres) of polynomials "
@@ -117,7 +122,7 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
                                 "noise does not explain the misfit. "
                                 "Chosen because the misfit is a sum of squares, a run is costly, and a fit over many "
                                 "runs sees past the noise of each.{}",
-                                count, starts, ends);
+                                count, descents, ends);
     return result;
 }
 

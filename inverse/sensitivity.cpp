@@ -79,15 +79,17 @@ void add_local(Indices& indices, std::size_t output, const UnitBox& box, const s
     indices.add(output, "elasticity", scaled(by_si, relative));
 }
 
-// By differences of whole runs.
-void add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design,
+// By differences of whole runs. Whether the output jumps among them.
+bool add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design,
                      const std::vector<double>& values) {
     const Eigen::VectorXd& x = design.points().front();
     std::vector<double> to_si;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         to_si.push_back(1.0 / box.slope(j, x[j]));
     }
-    add_local(indices, output, box, scaled(design.derivatives(values), to_si), values.front());
+    bool jumps = false;
+    add_local(indices, output, box, scaled(design.derivatives(values, &jumps), to_si), values.front());
+    return jumps;
 }
 
 // On the walk of one run; the interval spans what is seen from either side.
@@ -134,7 +136,10 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
         }
         const LocalDesign design(box.initial());
         for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
-            add_differences(indices, k, box, design, values);
+            if (add_differences(indices, k, box, design, values)) {
+                result.message += fmt::format("; '{}' jumps near the initial point, its derivatives are told from one side of that",
+                                              result.outputs[k].name);
+            }
         });
         break;
     }
@@ -205,10 +210,11 @@ void fill_runs(const UnitBox& box, const std::vector<Run>& runs, Sensitivity& re
 void conclude(const std::vector<Run>& runs, bool stopped, Sensitivity& result) {
     const auto failed = std::count_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
     const auto good = static_cast<std::ptrdiff_t>(runs.size()) - failed;
-    result.status = stopped     ? SensitivityStatus::interrupted
-                    : good == 0 ? SensitivityStatus::failed
-                                : SensitivityStatus::finished;
-    result.message = fmt::format("{} runs ended well", good);
+    const bool told = std::ranges::any_of(result.indices, [](const SensitivityIndex& index) { return !std::isnan(index.value); });
+    result.status = stopped ? SensitivityStatus::interrupted
+                    : told  ? SensitivityStatus::finished
+                            : SensitivityStatus::failed;
+    result.message = fmt::format("{} runs ended well", good) + result.message;
     if (failed > 0) {
         const auto first = std::find_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
         result.message +=

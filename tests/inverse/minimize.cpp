@@ -269,7 +269,7 @@ TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {
         OptimizerChoice choice;
         choice.starts = starts;
         search(objective, choice, Vector2d(0.2, 0.5), 1, [](const std::string&) {});
-        EXPECT_NEAR(objective.best()->x[0], starts == 1 ? 0.2 : 0.8, 0.06);
+        EXPECT_NEAR(objective.best()->x[0], 0.8, 0.06) << starts;  // 0.2 leaves six sigma, so that one start is too few
     }
 }
 

@@ -20,8 +20,8 @@
 namespace crampfit::testing {
 namespace {
 
-template <class Design>
-std::vector<double> values_at(const Design& design, double (*f)(const Eigen::VectorXd&)) {
+template <class Design, class Function>
+std::vector<double> values_at(const Design& design, const Function& f) {
     std::vector<double> values;
     for (const Eigen::VectorXd& x : design.points()) {
         values.push_back(f(x));
@@ -211,6 +211,22 @@ TEST(GradientSensitivity, LocalDerivativesAgreeWithCalculus) {
         values[2] = values[3] = values[1];
         EXPECT_TRUE(std::isnan(design.derivatives(values)[0].value));
     }
+}
+
+// A jump between two of the points: the slope is that of the side where x is, and it is told.
+TEST(GradientSensitivity, LocalDerivativesDoNotReachAcrossAJump) {
+    const Eigen::VectorXd x = Eigen::VectorXd::Constant(1, 0.5);
+    const LocalDesign design(x);
+    for (const double at : {0.495, 0.505, 0.49, 0.51}) {  // the points lie 0.0075 or 0.015 off, or twice as far
+        const auto f = [&](const Eigen::VectorXd& y) { return 3.0 + 2.0 * y[0] + 0.1 * y[0] * y[0] + (y[0] > at ? 5.0 : 0.0); };
+        bool jumps = false;
+        const auto slope = design.derivatives(values_at(design, f), &jumps);
+        EXPECT_TRUE(jumps) << at;
+        EXPECT_NEAR(slope[0].value, 2.1, 1e-6) << at;
+    }
+    bool jumps = false;
+    design.derivatives(values_at(design, [](const Eigen::VectorXd& y) { return std::exp(3 * y[0]); }), &jumps);
+    EXPECT_FALSE(jumps);
 }
 
 // Stands at 2 mm, jumps at 0.4 mm to 4 mm, stands to 0.8 mm, jumps to 6 mm and grows from there.

@@ -162,7 +162,7 @@ TEST(VerificationUncertainty, PriorsAreNotWidened) {
             study.experiments = {LinearTest::experiment("a", 110, error, 1.0)};
             study.parameters = {linear_toughness()};
             study.parameters[0].prior = Prior{110, sd};
-            study.uncertainty.posterior = 4000;
+            study.uncertainty.posterior = 16000;
             const Fit fit = fit_study(study, LinearTest::options());
             double chi_square = 0;
             for (const FitResidual& residual : fit.residuals) {
@@ -173,7 +173,7 @@ TEST(VerificationUncertainty, PriorsAreNotWidened) {
             EXPECT_NEAR(fit.parameters[0].standard_error / expected, 1, 1e-3) << sd << " " << error;
             double variance = 0;
             for (const PosteriorSample& sample : fit.posterior) {
-                variance += std::pow(sample.parameters[0] - fit.parameters[0].value, 2) / 4000;
+                variance += std::pow(sample.parameters[0] - fit.parameters[0].value, 2) / 16000;
             }
             EXPECT_NEAR(std::sqrt(variance) / expected, 1, 0.075) << sd << " " << error;
             study.uncertainty = {.profile = true, .posterior = 0};
