@@ -36,8 +36,8 @@ bool in_range(const Layout& layout, const Edge& edge, const Vec2& x) {
     return x[axis] >= edge.range->first - rounding && x[axis] <= edge.range->second + rounding;
 }
 
-// Whether a bonded body holds a node: one in it, and one that its outline passes by less than half a cell, through wood. So what it
-// holds ends as often before its outline as behind it.
+// Whether a bonded body holds a node: one in it, and one that its outline passes by less than half a cell, through wood. So what
+// it holds ends as often before its outline as behind it.
 bool holds_node(const Shape& shape, const SpecimenPlan& specimen, const Vec2& x, double cell) {
     const double hair = 1e-6 * cell;
     if (inside(shape, x)) return true;

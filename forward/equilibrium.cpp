@@ -37,7 +37,7 @@ constexpr double worth_keeping_with_friction = 0.25;
 // equilibrium is unstable.
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
-constexpr int sorting = 6;  // iterations without an end after which faces that rub are sorted into those that grip and slide
+constexpr int sorting = 6;       // iterations without an end after which faces that rub are sorted into those that grip and slide
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.

@@ -268,9 +268,9 @@ class Equilibrium {
         Mat2 remainder;  // force on the fields less that on the body by their motion against it, with sign [N/m]
     };
     std::vector<Rubbing> rubbing_;
-    std::vector<Vec2> settled_;     // displacement from which friction on crack faces counts; empty: no such faces
-    std::vector<Grip> face_grips_;  // [pairs, or fewer: the others have not slid yet]
-    double face_dissipated_ = 0;    // until then [J]
+    std::vector<Vec2> settled_;            // displacement from which friction on crack faces counts; empty: no such faces
+    std::vector<Grip> face_grips_;         // [pairs, or fewer: the others have not slid yet]
+    double face_dissipated_ = 0;           // until then [J]
     static constexpr double joint = 0.01;  // stiffness of a spring between faces over that of closed ones
     bool joins_faces_ = false;             // in the tangent, faces that rub by springs whether they touch or not
 };

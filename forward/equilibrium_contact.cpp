@@ -311,8 +311,8 @@ bool Equilibrium::sort_out_faces() {
         pairs.push_back(static_cast<int>(k));
         const double stiffness = closed_stiffness(pair);
         places.push_back({pair.normal, stiffness, scene_.cracks[pair.crack].faces.coefficient,
-                          displacement_[pair.left] - displacement_[pair.right], settled_[pair.left] - settled_[pair.right], stretch,
-                          joint * stiffness});
+                          displacement_[pair.left] - displacement_[pair.right], settled_[pair.left] - settled_[pair.right],
+                          stretch, joint * stiffness});
     }
     joins_faces_ = true;
     const bool made = factor_tangent(true) || factor_tangent(false);

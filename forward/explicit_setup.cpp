@@ -1,6 +1,5 @@
 #include "forward/explicit.hpp"
 
-
 #include <algorithm>
 #include <cmath>
 #include <map>

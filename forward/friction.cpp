@@ -101,7 +101,7 @@ Vec2 RubbingPlace::force(const Vec2& step) const {
 Eigen::VectorXd balance_of_rubbing(const std::vector<RubbingPlace>& places, const Eigen::MatrixXd& compliance,
                                    const Eigen::VectorXd& without) {
     constexpr int most_rounds = 4000;
-    constexpr double settled = 1e-11;  // of the largest force
+    constexpr double settled = 1e-11;                            // of the largest force
     std::vector<Mat2> own(places.size()), freed(places.size());  // compliances; and without its joint's spring
     for (std::size_t i = 0; i < places.size(); ++i) {
         own[i] = compliance.block<2, 2>(2 * i, 2 * i);

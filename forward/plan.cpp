@@ -323,9 +323,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const std::string why =
         scene.solver.kind != SolverKind::automatic ? "asked for in solver.kind"
         : plan.free_bodies                         ? "a body that follows a force is in equilibrium with the specimen"
-        : bridged ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
-        : starts_in_motion(scene)   ? "a part starts in motion"
-        : scene.solver.damping > 0.0 ? "solver.damping is given, and equilibrium has no motion to damp"
+        : bridged                 ? "crack faces that a traction pulls together: their law hangs on the way to an opening"
+        : starts_in_motion(scene) ? "a part starts in motion"
+        : scene.solver.damping > 0.0
+            ? "solver.damping is given, and equilibrium has no motion to damp"
             : fmt::format("the load takes {:.3g} transits of a wave through the specimen; equilibrium from {} on", plan.slowness,
                           slow_loading);
     if (plan.quasistatic)
@@ -356,9 +357,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                  least_coarse_cells)
                    : "solver.extrapolate is false");
     if (plan.quasistatic && plan.grows && least_advance > 0.0 && least_advance < body.layout.cell.minCoeff() * (1.0 - 1e-6))
-        choose("advance", "shorter than a cell",
-               "what is released over less than a cell goes in steps with the grid: the load comes out too high; 0 takes G at the "
-               "tip instead, or take finer cells");
+        choose(
+            "advance", "shorter than a cell",
+            "what is released over less than a cell goes in steps with the grid: the load comes out too high; 0 takes G at the "
+            "tip instead, or take finer cells");
     if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) &&
         least_advance > 0.0)
         choose("tips near sharp boundaries", "boxes with finer cells around them",

@@ -143,7 +143,8 @@ void end_at_sides(const Scene& scene, Record& record) {
     };
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
         for (const bool at_end : {false, true}) {
-            if (scene.cracks[k].grows != Growth::both && scene.cracks[k].grows != (at_end ? Growth::end : Growth::start)) continue;
+            if (scene.cracks[k].grows != Growth::both && scene.cracks[k].grows != (at_end ? Growth::end : Growth::start))
+                continue;
             std::vector<Vec2>& path = record.paths[k];
             std::vector<Vec2> back = path;
             if (at_end) std::ranges::reverse(back);

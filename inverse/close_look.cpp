@@ -131,7 +131,7 @@ bool take_profile(CloseLook& look) {
             constexpr double coarse = 0.1;  // of the window: twice the profile's steps
             const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
             const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
-            const bool from_bound = way.window.origin[j] < rounding, to_bound = way.window.origin[j] + scale > 1.0 - rounding;
+            const bool from_bound = way.window.origin[j]<rounding, to_bound = way.window.origin[j] + scale> 1.0 - rounding;
             if ((ends.first <= 0.0 && !from_bound) || (ends.second >= 1.0 && !to_bound)) {
                 return false;
             }

@@ -45,7 +45,8 @@ void check_rises(const Experiment& experiment, const std::vector<double>& abscis
         }
     }
     if (high - low <= 0) {
-        throw bad_data(experiment, column, fmt::format("{:g}", low), "all rows that can be compared stand there: two or more must differ");
+        throw bad_data(experiment, column, fmt::format("{:g}", low),
+                       "all rows that can be compared stand there: two or more must differ");
     }
     if (fall > 0.05 * (high - low)) {
         throw bad_data(experiment, column, fmt::format("{:g} after {:g}", high - fall, high),

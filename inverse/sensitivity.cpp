@@ -137,8 +137,9 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
         const LocalDesign design(box.initial());
         for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
             if (add_differences(indices, k, box, design, values)) {
-                result.message += fmt::format("; '{}' jumps near the initial point, its derivatives are told from one side of that",
-                                              result.outputs[k].name);
+                result.message +=
+                    fmt::format("; '{}' jumps near the initial point, its derivatives are told from one side of that",
+                                result.outputs[k].name);
             }
         });
         break;
@@ -211,9 +212,7 @@ void conclude(const std::vector<Run>& runs, bool stopped, Sensitivity& result) {
     const auto failed = std::count_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
     const auto good = static_cast<std::ptrdiff_t>(runs.size()) - failed;
     const bool told = std::ranges::any_of(result.indices, [](const SensitivityIndex& index) { return !std::isnan(index.value); });
-    result.status = stopped ? SensitivityStatus::interrupted
-                    : told  ? SensitivityStatus::finished
-                            : SensitivityStatus::failed;
+    result.status = stopped ? SensitivityStatus::interrupted : told ? SensitivityStatus::finished : SensitivityStatus::failed;
     result.message = fmt::format("{} runs ended well", good) + result.message;
     if (failed > 0) {
         const auto first = std::find_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });

@@ -246,7 +246,8 @@ TEST(UnitScene, CracksMayCrossOrTouchButNotLieOnEachOther) {
     const auto with = [&](const std::string& points) { return plain_scene + first + "[[cracks]]\npoints = " + points + "\n"; };
     for (const char* points : {"[[\"0 mm\", \"5 mm\"], [\"4 mm\", \"5 mm\"]]", "[[\"5 mm\", \"5 mm\"], [\"3 mm\", \"5 mm\"]]",
                                "[[\"2 mm\", \"2 mm\"], [\"2 mm\", \"5 mm\"], [\"3 mm\", \"5 mm\"]]"})
-        expect_error((folder / "scene.toml").string(), "cracks.1.points", "lies on cracks.0", [&] { folder.parse(with(points)); });
+        expect_error((folder / "scene.toml").string(), "cracks.1.points", "lies on cracks.0",
+                     [&] { folder.parse(with(points)); });
     for (const char* points : {"[[\"4 mm\", \"5 mm\"], [\"6 mm\", \"5 mm\"]]", "[[\"2 mm\", \"2 mm\"], [\"2 mm\", \"8 mm\"]]",
                                "[[\"0 mm\", \"5.1 mm\"], [\"4 mm\", \"5.1 mm\"]]"})
         EXPECT_EQ(folder.parse(with(points)).cracks.size(), 2u);

@@ -411,7 +411,8 @@ TEST(VerificationPath, AnOpenCrackNearModeIIKeepsItsModeI) {
         scene.measure = {"top", "top"};
         scene.stop.time = 10e-3;
         const Instant end = simulate(scene).series.back();
-        std::printf("near mode II on %.1f mm cells: K_I %.4f, K_II %.4f MPa sqrt(m)\n", 1e3 * cell, 1e-6 * end.K_I, 1e-6 * end.K_II);
+        std::printf("near mode II on %.1f mm cells: K_I %.4f, K_II %.4f MPa sqrt(m)\n", 1e3 * cell, 1e-6 * end.K_I,
+                    1e-6 * end.K_II);
         EXPECT_NEAR(end.K_I, 2.82e4, 0.025 * 2e5);
         EXPECT_NEAR(end.K_II, 1.982e5, 0.02 * 2e5);
     }
