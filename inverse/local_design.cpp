@@ -39,10 +39,11 @@ double slope(std::span<const double> at, std::span<const double> values) {
     return coefficients[0] / difference_step;
 }
 
-// The neighbours that a jump of the function parts from 0 are left out: between two points that follow each other it changes
-// otherwise than between all others, which agree, and by more than this part of the function's value. Whether there was one.
+// The neighbours that a jump of the function parts from 0 are left out: between two points that follow each other it changes by
+// more than this part of its value, and otherwise than between all others, farther than these differ: a slope in the middle that
+// changes evenly lies between them, one at an end half as far off. Whether there was one.
 bool drop_beyond_jump(std::vector<double>& at, std::vector<double>& change, double value) {
-    constexpr double spreads = 5.0, part = 0.2, least = 1e-5;
+    constexpr double spreads_inside = 1.0, spreads_at_end = 5.0, part = 0.2, least = 1e-5;
     if (at.size() < points_a_parameter) {
         return false;
     }
@@ -60,6 +61,7 @@ bool drop_beyond_jump(std::vector<double>& at, std::vector<double>& change, doub
         others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
         const auto [low, high] = std::ranges::minmax(others);
         const double off = std::max(low - slopes[k], slopes[k] - high);
+        const double spreads = k == 0 || k + 1 == slopes.size() ? spreads_at_end : spreads_inside;
         if (off <= spreads * (high - low) || off <= part * std::max(std::abs(low), std::abs(high)) ||
             off * (line[k + 1].first - line[k].first) <= least * std::abs(value)) {
             continue;

@@ -224,8 +224,12 @@ TEST(GradientSensitivity, LocalDerivativesDoNotReachAcrossAJump) {
         EXPECT_TRUE(jumps) << at;
         EXPECT_NEAR(slope[0].value, 2.1, 1e-6) << at;
     }
+    const auto stands_before = [](const Eigen::VectorXd& y) { return y[0] < 0.495 ? 2.5 : 2.0 + 2.0 * y[0]; };
+    EXPECT_NEAR(design.derivatives(values_at(design, stands_before))[0].value, 2.0, 1e-6);
     bool jumps = false;
     design.derivatives(values_at(design, [](const Eigen::VectorXd& y) { return std::exp(3 * y[0]); }), &jumps);
+    design.derivatives(values_at(design, [](const Eigen::VectorXd& y) { return std::tanh(4 * (y[0] - 0.5)); }), &jumps);
+    design.derivatives(values_at(design, [](const Eigen::VectorXd& y) { return std::pow(y[0] - 0.5, 2); }), &jumps);
     EXPECT_FALSE(jumps);
 }
 
