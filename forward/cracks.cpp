@@ -478,6 +478,15 @@ std::array<int, most_nodes> CrackFields::fields_at(const Vec2& x) const {
     return fields;
 }
 
+Vec2 CrackFields::displacement_at(const Vec2& x, const std::vector<Vec2>& displacement) const {
+    const Layout& layout = body_->layout;
+    const auto values = body_->values_at(layout.cell_at(x), x);
+    const auto fields = fields_at(x);
+    Vec2 sum = Vec2::Zero();
+    for (int k = 0; k < layout.nodes_per_cell(); ++k) sum += values[k] * displacement[fields[k]];
+    return sum;
+}
+
 Vec2 CrackFields::opening(int crack, const Vec2& x, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_->layout;
     const int c = layout.cell_at(x);

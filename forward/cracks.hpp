@@ -118,6 +118,9 @@ class CrackFields {
     /// The fields at the nodes that x's cell sees with which the material at x moves: the first `nodes_per_cell()` of these.
     std::array<int, most_nodes> fields_at(const Vec2& x) const;
 
+    /// Of the material at x, from the fields' displacements [m].
+    Vec2 displacement_at(const Vec2& x, const std::vector<Vec2>& displacement) const;
+
     /// On which side of a crack x lies, seen from start to end; its ends go on straight.
     bool is_left(int crack, const Vec2& x) const;
 

@@ -320,6 +320,44 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
     return seen;
 }
 
+// What the near-tip stress t puts on the faces of a crack that bends within the domain, in the interaction integral of both
+// modes: - int t_ij m_j u_i,k q_k ds along both faces, m their outward normal. A straight crack's faces are free of t.
+Vec2 work_on_bent_faces(const CrackFields& cracks, const CrackLine& line, bool at_end, const NearTipField& field,
+                        const Extension& extension, const std::vector<Vec2>& displacement, const Mat2& turn, bool rotates,
+                        double step) {
+    const CrackTip& tip = line.tip(at_end);
+    const Vec2& ahead = tip.direction;
+    Mat2 axes;
+    axes << ahead, left_of(ahead);
+    Vec2 sum = Vec2::Zero();
+    for (std::size_t k = 0; k + 1 < line.points.size(); ++k) {
+        const Vec2& far = at_end ? line.points[k] : line.points[k + 1];
+        const Vec2& near = at_end ? line.points[k + 1] : line.points[k];
+        const Vec2 along = (near - far).normalized();
+        if (std::abs(cross(ahead, along)) < 1e-9 && std::abs(cross(ahead, near - tip.position)) < 1e-9 * step) continue;
+        const int pieces = static_cast<int>(std::ceil((near - far).norm() / step));
+        for (int piece = 0; piece < pieces; ++piece) {
+            const Vec2 a = far + (near - far) * piece / pieces, b = far + (near - far) * (piece + 1) / pieces;
+            const Vec2 arm = 0.5 * (a + b) - tip.position;
+            const double size = extension.size_at(tip.position + arm);
+            if (size == 0.0) continue;
+            for (const bool left : {true, false}) {
+                const Vec2 outward = (left ? -1.0 : 1.0) * left_of(along);
+                double angle = std::atan2(cross(ahead, arm), ahead.dot(arm));
+                if (ahead.dot(arm) < 0.0 && left != (angle > 0.0)) angle += (left ? 2.0 : -2.0) * std::numbers::pi;
+                const auto at = [&](const Vec2& x) { return cracks.displacement_at(x - 1e-6 * step * outward, displacement); };
+                const Vec2 stretch = at(b) - at(a);
+                const Vec2 seen = rotates ? Vec2(turn.transpose() * (b - a + stretch) - (b - a))
+                                          : Vec2(stretch - 0.5 * (turn - turn.transpose()) * (b - a));
+                const auto modes = field.at(arm.norm(), angle);
+                for (int mode = 0; mode < 2; ++mode)
+                    sum[mode] -= size * (axes.transpose() * seen).dot(modes[mode].stress * (axes.transpose() * outward));
+            }
+        }
+    }
+    return sum;
+}
+
 // K_I and K_II by the interaction integral (Yau, Wang and Corten 1980), in the incompatibility form for wood that changes from
 // place to place (Dolbow and Gosz 2002; Kim and Paulino 2005):
 //     M = int [ (s_ij a_i,k + t_ij u_i,k - t_mn e_mn d_kj) q_k,j + (S_ijmn s_mn t_ij,k - e_ij t_ij,k + rho u_i,tt a_i,k) q_k ] dA
@@ -327,9 +365,10 @@ Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const M
 // K = H^-1 M / 2. No derivative of the wood's constants is in it, so that it holds across sharp boundaries too (Yu et al. 2009).
 // Seen from the frame that has turned with the wood around the tip the displacement gradients are small, in finite rotation as
 // well. Tractions on pressed faces take - int t_i [a_i],k q_k ds off, in which [a],1 goes with r^-1/2. Left out: the speed of a
-// running tip in a and t, and the traction that t puts on the faces of a crack that bends within the domain.
-Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool at_end, const NearTipField& field,
-                       const Extension& extension, const NodalState& nodal, const std::vector<FacePiece>& pieces, bool rotates) {
+// running tip in a and t.
+Vec2 intensity_factors(const Discretisation& body, const CrackFields& cracks, const CrackLine& line, bool at_end,
+                       const NearTipField& field, const Extension& extension, const NodalState& nodal,
+                       const std::vector<FacePiece>& pieces, bool rotates) {
     const Points& points = body.points;
     const CrackTip& tip = line.tip(at_end);
     const Mat2 turn = mean_turn(body, tip.position, extension, nodal);
@@ -361,6 +400,8 @@ Vec2 intensity_factors(const Discretisation& body, const CrackLine& line, bool a
             sum[mode] += integrand * points.volume[p];
         }
     });
+    sum += body.layout.thickness * work_on_bent_faces(cracks, line, at_end, field, extension, nodal.displacement, turn, rotates,
+                                                      0.5 * body.layout.cell.minCoeff());
     const auto left = field.at(1.0, std::numbers::pi), right = field.at(1.0, -std::numbers::pi);
     for (const FacePiece& piece : pieces) {
         const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
@@ -404,7 +445,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     load.opening = opening_behind(cracks, crack, at_end, h, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
-    const Vec2 K = intensity_factors(body, line, at_end, field, anywhere, state, pieces, options.rotates);
+    const Vec2 K = intensity_factors(body, cracks, line, at_end, field, anywhere, state, pieces, options.rotates);
     // Faces that press on each other behind the tip leave no mode I. Near mode II the grid lets those of the tip's own cell press
     // where the crack is open.
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
