@@ -335,7 +335,7 @@ Vec2 work_on_bent_faces(const CrackFields& cracks, const CrackLine& line, bool a
         const Vec2& near = at_end ? line.points[k + 1] : line.points[k];
         const Vec2 along = (near - far).normalized();
         if (std::abs(cross(ahead, along)) < 1e-9 && std::abs(cross(ahead, near - tip.position)) < 1e-9 * step) continue;
-        const int pieces = static_cast<int>(std::ceil((near - far).norm() / step));
+        const int pieces = static_cast<int>(std::ceil((near - far).norm() / step - 1e-6));
         for (int piece = 0; piece < pieces; ++piece) {
             const Vec2 a = far + (near - far) * piece / pieces, b = far + (near - far) * (piece + 1) / pieces;
             const Vec2 arm = 0.5 * (a + b) - tip.position;

@@ -78,7 +78,7 @@ class Equilibrium {
     Eigen::MatrixXd yields_to(Eigen::MatrixXd loads) const;
 
     /// What such loads do on each other's motion, loads^T yields_to(loads), at half its cost.
-    Eigen::MatrixXd compliance(const Eigen::MatrixXd& loads) const;
+    Eigen::MatrixXd compliance(const Eigen::SparseMatrix<double>& loads) const;
 
     /// Derivatives by numbers of the materials at this equilibrium.
     struct Slopes {

@@ -62,10 +62,13 @@ Eigen::MatrixXd Equilibrium::yields_to(Eigen::MatrixXd loads) const {
     return loads;
 }
 
-Eigen::MatrixXd Equilibrium::compliance(const Eigen::MatrixXd& loads) const {
-    Eigen::MatrixXd right(equations_, loads.cols());
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) right.row(equation_[dof]) = loads.row(dof);
+Eigen::MatrixXd Equilibrium::compliance(const Eigen::SparseMatrix<double>& loads) const {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int k = 0; k < loads.outerSize(); ++k)
+        for (Eigen::SparseMatrix<double>::InnerIterator entry(loads, k); entry; ++entry)
+            if (equation_[entry.row()] >= 0) entries.emplace_back(equation_[entry.row()], k, entry.value());
+    GridFactor::Sparse right(equations_, loads.cols());
+    right.setFromTriplets(entries.begin(), entries.end());
     return factor_.compliance(right);
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <future>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 extern "C" void dpotrf_(const char* triangle, const int* order, double* matrix, const int* leading, int* info);
@@ -430,10 +431,8 @@ void GridFactor::solve_few(Eigen::Ref<Eigen::MatrixXd> right) const {
     });
 }
 
-// x := L^-1 x for many; gives room for the way back, [boxes][border x columns].
-std::vector<Eigen::MatrixXd> GridFactor::forward_many(Eigen::Ref<Eigen::MatrixXd> x) const {
-    using Part = Eigen::MatrixXd;
-    std::vector<Part> left(boxes_.size());  // what each leaves for the box that it is a half of
+void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
+    std::vector<Eigen::MatrixXd> left(boxes_.size());  // what each box leaves for the one that it is a half of
     const int top = static_cast<int>(boxes_.size()) - 1;
     upward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
@@ -441,7 +440,7 @@ std::vector<Eigen::MatrixXd> GridFactor::forward_many(Eigen::Ref<Eigen::MatrixXd
         left[b].setZero(box.border, x.cols());
         for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
             const Box& half = boxes_[box.half[h]];
-            const Part& from = left[box.half[h]];
+            const Eigen::MatrixXd& from = left[box.half[h]];
             for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
                 const int row = half.offset[half.eliminated + k] - half.inner;
                 const int to = box.offset[box.slot[h][k]];
@@ -455,13 +454,8 @@ std::vector<Eigen::MatrixXd> GridFactor::forward_many(Eigen::Ref<Eigen::MatrixXd
         box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
         left[b].noalias() -= box.factor.bottomRows(box.border) * own;
     });
-    return left;
-}
-
-void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
-    std::vector<Eigen::MatrixXd> left = forward_many(x);
     take_off_wide(x);
-    downward(static_cast<int>(boxes_.size()) - 1, forks_, [&](int b) {
+    downward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
         auto own = x.middleRows(first_[box.nodes[0]], box.inner);
@@ -480,44 +474,64 @@ void GridFactor::solve(Eigen::MatrixXd& right) const {
     else solve_few(right);
 }
 
-Eigen::MatrixXd GridFactor::compliance(const Eigen::MatrixXd& right) const {
-    constexpr Eigen::Index together = 32;
-    Eigen::MatrixXd x = right;
-    for (Eigen::Index c = 0; c < x.cols(); c += together) forward_many(x.middleCols(c, std::min(together, x.cols() - c)));
-    Eigen::MatrixXd found = x.transpose() * x;
-    if (wide_.empty()) return found;
-    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), x.cols());
-    for (const WidePart& part : wide_) seen.noalias() += part.columns.transpose() * x.middleRows(part.first, part.columns.rows());
-    return found - seen.transpose() * wide_change_ * seen;
+// L^-1 times right sides, box by box.
+std::vector<GridFactor::Part> GridFactor::forward_parts(const Sparse& right) const {
+    std::vector<Part> parts;
+    std::vector<Part> left(boxes_.size());     // what each leaves for the box that it is a half of
+    std::vector<int> column_of(right.cols());  // of a right side, in the front at hand
+    std::vector<int> row_of;                   // of what a half has left, there
+    for (std::size_t b = 0; b < boxes_.size(); ++b) {
+        const Box& box = boxes_[b];
+        Part part{box.inner > 0 ? first_[box.nodes[0]] : 0, {}, {}};
+        std::vector<int>& sides = part.sides;
+        for (const int half : box.half)
+            if (half >= 0) sides.insert(sides.end(), left[half].sides.begin(), left[half].sides.end());
+        for (int row = part.first; row < part.first + box.inner; ++row)
+            for (Sparse::InnerIterator entry(right, row); entry; ++entry) sides.push_back(static_cast<int>(entry.col()));
+        if (sides.empty()) continue;
+        std::ranges::sort(sides);
+        sides.erase(std::ranges::unique(sides).begin(), sides.end());
+        const auto columns = static_cast<Eigen::Index>(sides.size());
+        for (Eigen::Index k = 0; k < columns; ++k) column_of[sides[k]] = static_cast<int>(k);
+        part.rows.setZero(box.inner, columns);
+        Eigen::MatrixXd at_border = Eigen::MatrixXd::Zero(box.border, columns);
+        for (int row = 0; row < box.inner; ++row)
+            for (Sparse::InnerIterator entry(right, part.first + row); entry; ++entry)
+                part.rows(row, column_of[entry.col()]) = entry.value();
+        for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
+            const Part from = std::exchange(left[box.half[h]], {});
+            row_of.clear();
+            for (const int slot : box.slot[h])
+                for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) row_of.push_back(to);
+            for (Eigen::Index k = 0; k < from.rows.cols(); ++k) {
+                const int column = column_of[from.sides[k]];
+                for (std::size_t row = 0; row < row_of.size(); ++row) {
+                    const int to = row_of[row];
+                    (to < box.inner ? part.rows(to, column) : at_border(to - box.inner, column)) += from.rows(row, k);
+                }
+            }
+        }
+        box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(part.rows);
+        at_border.noalias() -= box.factor.bottomRows(box.border) * part.rows;
+        left[b] = {0, sides, std::move(at_border)};
+        if (box.inner > 0) parts.push_back(std::move(part));
+    }
+    return parts;
+}
+
+Eigen::MatrixXd GridFactor::compliance(const Sparse& right) const {
+    Eigen::MatrixXd found = Eigen::MatrixXd::Zero(right.cols(), right.cols());
+    for (const Part& part : forward_parts(right)) found(part.sides, part.sides) += part.rows.transpose() * part.rows;
+    return found;
 }
 
 bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness) {
     const auto columns = static_cast<Eigen::Index>(equations.size());
+    Sparse units(std::reduce(count_.begin(), count_.end()), columns);
+    for (Eigen::Index k = 0; k < columns; ++k) units.insert(equations[k], k) = 1.0;
+    wide_ = forward_parts(units);
     Eigen::MatrixXd yield = Eigen::MatrixXd::Zero(columns, columns);  // Z^T Z
-    std::vector<Eigen::MatrixXd> left(
-        boxes_.size());  // [border x columns] what each leaves for the box that it is a half of; empty: nothing
-    for (std::size_t b = 0; b < boxes_.size(); ++b) {
-        const Box& box = boxes_[b];
-        const int first = box.inner > 0 ? first_[box.nodes[0]] : 0;
-        const auto begin = std::lower_bound(equations.begin(), equations.end(), first);
-        const auto end = std::lower_bound(begin, equations.end(), first + box.inner);
-        const auto leaves_some = [&](int half) { return half >= 0 && left[half].size() > 0; };
-        if (begin == end && std::none_of(box.half.begin(), box.half.end(), leaves_some)) continue;
-        Eigen::MatrixXd front = Eigen::MatrixXd::Zero(box.inner + box.border, columns);
-        for (auto e = begin; e != end; ++e) front(*e - first, e - equations.begin()) = 1.0;
-        for (int h = 0; h < 2; ++h) {
-            if (!leaves_some(box.half[h])) continue;
-            const Eigen::MatrixXd from = std::exchange(left[box.half[h]], {});
-            Eigen::Index row = 0;
-            for (const int slot : box.slot[h])
-                for (int to = box.offset[slot]; to < box.offset[slot + 1]; ++to) front.row(to) += from.row(row++);
-        }
-        auto own = front.topRows(box.inner);
-        box.factor.topRows(box.inner).triangularView<Eigen::Lower>().solveInPlace(own);
-        yield.noalias() += own.transpose() * own;
-        left[b] = front.bottomRows(box.border) - box.factor.bottomRows(box.border) * own;
-        wide_.push_back({first, own});
-    }
+    for (const Part& part : wide_) yield(part.sides, part.sides) += part.rows.transpose() * part.rows;
     const Eigen::LLT<Eigen::MatrixXd> root(yield);
     const auto failed = [&] {
         wide_.clear();
@@ -535,10 +549,11 @@ bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::Matrix
 void GridFactor::take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const {
     if (wide_.empty()) return;
     Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), forward.cols());
-    for (const WidePart& part : wide_)
-        seen.noalias() += part.columns.transpose() * forward.middleRows(part.first, part.columns.rows());
+    for (const Part& part : wide_)
+        seen(part.sides, Eigen::all) += part.rows.transpose() * forward.middleRows(part.first, part.rows.rows());
     const Eigen::MatrixXd change = wide_change_ * seen;
-    for (const WidePart& part : wide_) forward.middleRows(part.first, part.columns.rows()).noalias() -= part.columns * change;
+    for (const Part& part : wide_)
+        forward.middleRows(part.first, part.rows.rows()).noalias() -= part.rows * change(part.sides, Eigen::all);
 }
 
 double GridFactor::reciprocal_condition() const {

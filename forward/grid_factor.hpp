@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/SparseCore>
 
 #include <array>
 #include <functional>
@@ -47,8 +47,11 @@ class GridFactor {
     /// Solves for right sides [equations x any number], in place. One call at a time.
     void solve(Eigen::MatrixXd& right) const;
 
-    /// What right sides [equations x any number] do on each other's solutions, R^T A^-1 R, which takes half of a solution.
-    Eigen::MatrixXd compliance(const Eigen::MatrixXd& right) const;
+    using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+    /// What right sides [equations x any number] do on each other's solutions, R^T A^-1 R, without what `add_wide` has added.
+    /// Takes half of a solution, and less as each is nil in most places.
+    Eigen::MatrixXd compliance(const Sparse& right) const;
 
     /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is
     /// not positive definite.
@@ -101,7 +104,8 @@ class GridFactor {
     static void forward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
     static void backward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
     void solve_few(Eigen::Ref<Eigen::MatrixXd> right) const;
-    std::vector<Eigen::MatrixXd> forward_many(Eigen::Ref<Eigen::MatrixXd> right) const;
+    struct Part;
+    std::vector<Part> forward_parts(const Sparse& right) const;
     void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
 
     int cells_x_, cells_y_;
@@ -115,11 +119,12 @@ class GridFactor {
 
     // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T)
     // L^-1, where Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
-    struct WidePart {
-        int first;                // equation
-        Eigen::MatrixXd columns;  // rows of Z from there on; the others are nil
+    struct Part {                // of L^-1 R, R sparse
+        int first;               // equation
+        std::vector<int> sides;  // that are not nil in the equations from there on
+        Eigen::MatrixXd rows;    // [equations x sides]
     };
-    std::vector<WidePart> wide_;   // of the boxes that hold the equations
+    std::vector<Part> wide_;       // of Z
     Eigen::MatrixXd wide_change_;  // W
 };
 

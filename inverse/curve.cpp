@@ -130,21 +130,16 @@ Curve Curve::smoothed(double window) const {
 }
 
 std::optional<double> Curve::arrival(double level) const {
-    const auto reached = std::find_if(y_.begin(), y_.end(), [level](double y) { return y >= level; });
-    if (reached == y_.end()) {
+    if (*std::max_element(y_.begin(), y_.end()) < level) {
         return std::nullopt;
     }
-    const auto crossing = [&](std::size_t below) {
-        return std::lerp(x_[below], x_[below + 1], (level - y_[below]) / (y_[below + 1] - y_[below]));
-    };
-    const auto first = static_cast<std::size_t>(reached - y_.begin());
-    const double early = first == 0 ? x_.front() : crossing(first - 1);
-    std::size_t above = y_.size();  // the nodes from here on are all at the level or above it
-    while (above > 0 && y_[above - 1] >= level) {
-        --above;
+    double below = 0;
+    for (std::size_t i = 0; i + 1 < x_.size(); ++i) {
+        const bool first = y_[i] < level, second = y_[i + 1] < level;
+        const double share = first == second ? 1.0 : (level - std::min(y_[i], y_[i + 1])) / std::abs(y_[i + 1] - y_[i]);
+        below += first || second ? share * (x_[i + 1] - x_[i]) : 0.0;
     }
-    const double late = above == 0 ? x_.front() : above == y_.size() ? x_.back() : crossing(above - 1);
-    return 0.5 * (early + late);
+    return x_.front() + below;
 }
 
 }  // namespace crampfit

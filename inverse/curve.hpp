@@ -31,9 +31,9 @@ class Curve {
     /// alike, so that a straight line stays what it is.
     Curve smoothed(double window) const;
 
-    /// Where the curve comes up to `level`: midway between where it first reaches it and where it is last below it,
-    /// which for a rising curve is one place and for a noisy one has no bias towards early arrival. Absent when it is
-    /// never reached.
+    /// Where the curve comes up to `level`: so that it is above for as long before as it is below after, which for a rising curve
+    /// is one place. A noisy one has no bias towards early arrival, and a row that is far off counts as one row. Absent when the
+    /// level is never reached.
     std::optional<double> arrival(double level) const;
 
     const std::vector<double>& x() const { return x_; }

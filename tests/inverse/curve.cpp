@@ -93,4 +93,20 @@ TEST(UnitCurve, ArrivalOfANoisyCurveLiesMidway) {
     EXPECT_DOUBLE_EQ(*curve.arrival(1), 1.5);  // first reached at 0.5, last below at 2.5
 }
 
+// A crack that stands and jumps: one row far off must not move the jump half way to it.
+TEST(UnitCurve, ARowFarOffHardlyMovesAnArrival) {
+    std::vector<double> x, y;
+    for (int i = 0; i < 200; ++i) {
+        x.push_back(i);
+        y.push_back(i < 100 ? 0.0 : 2.0);
+    }
+    const double exact = *Curve(x, y).arrival(1.0);
+    EXPECT_DOUBLE_EQ(exact, 99.5);
+    for (const int far_off : {0, 50}) {
+        std::vector<double> noisy = y;
+        noisy[far_off] = 1.5;
+        EXPECT_NEAR(*Curve(x, noisy).arrival(1.0), exact, 1.0);
+    }
+}
+
 }  // namespace
