@@ -182,7 +182,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     WideSearch before(study, options, store, [&] { reporter.look(); });
     const bool has_begun = by_walks && before.descend(stage);
     SearchResult found = has_begun  ? runs.descend(1, before.best(), stage)
-                         : by_walks ? runs.descend(study.optimizer.starts, box.initial(), stage)
+                         : by_walks ? runs.descend(stage)
                                     : runs.search(box.initial(), stage);
     found.method += before.method();
     objective.set_budget_left(objective.budget_left() + reserve);

@@ -35,6 +35,11 @@ bool has(const Scene& scene, const std::string& key) {
     }
 }
 
+// By which equilibria have derivatives.
+bool is_of_wood(const Setting& setting) {
+    return setting.key.starts_with("materials.") || setting.key.starts_with("specimen.density_exponents.");
+}
+
 }  // namespace
 
 class KeptWalks::Store {
@@ -122,9 +127,7 @@ class KeptWalks::Store {
     }
 
     bool has_slopes() const {
-        const bool of_wood =
-            std::all_of(others_.begin(), others_.end(), [](const Setting& s) { return s.key.starts_with("materials."); });
-        return of_wood &&
+        return std::all_of(others_.begin(), others_.end(), is_of_wood) &&
                std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
     }
 
@@ -250,7 +253,7 @@ class KeptWalks::Store {
         std::vector<std::string> numbers;
         for (const Setting& setting : others_) {
             const bool stays = unit && setting.parameter == unit->parameter;
-            if (!stays && setting.key.starts_with("materials.") && has(scene, setting.key)) {
+            if (!stays && is_of_wood(setting) && has(scene, setting.key)) {
                 numbers.push_back(setting.key);
             }
         }

@@ -80,7 +80,6 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
                                   const Stage& stage) {
     constexpr double explained = 1.3;  // reduced chi-square: as far above 1 as noise goes
     constexpr double unexplained = 4;  // residuals of two sigma
-    constexpr int least_where_unexplained = 4;
     const int p = static_cast<int>(initial.size());
     const int count = std::max(starts, 2 * p + 2);
     stage("starts");
@@ -114,7 +113,7 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
         if (solution.converged && left < explained) {
             break;
         }
-        descents = left > unexplained ? std::max(starts, least_where_unexplained) : starts;
+        descents = left > unexplained ? std::max(starts, least_starts_where_unexplained) : starts;
     }
     result.method = fmt::format("auto: {} starting points side by side, then steps from the best of them to the least "
                                 "misfit (Ceres) of polynomials "

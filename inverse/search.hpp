@@ -16,6 +16,9 @@ struct SearchResult {
     std::string method;  // what did the work, and why it was chosen
 };
 
+/// Starts that `auto` takes where residuals stay above two sigma, if the study does not ask for more.
+inline constexpr int least_starts_where_unexplained = 4;
+
 /// Searches the unit cube as a study asks: from `initial` and `starts - 1` further Sobol points of the box.
 /// Local methods descend from each of them, side by side; global ones have the box for themselves; `auto` runs each of
 /// them once, descends from the best, and from others only as long as the noise does not explain the misfit. `stage` is

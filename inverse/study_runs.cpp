@@ -125,6 +125,10 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     return found;
 }
 
+SearchResult StudyRuns::descend(const std::function<void(const std::string&)>& stage) {
+    return descend(std::max(study_.optimizer.starts, least_starts_where_unexplained), model_.box().initial(), stage);
+}
+
 bool StudyRuns::descend_again() { return weigh_and_descend(crampfit::descend_again(objective_, nearby_, options_.seed), false); }
 
 SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage) {

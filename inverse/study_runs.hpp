@@ -29,6 +29,8 @@ class StudyRuns {
     /// Steps along walks from `initial`, and from further points as long as the noise does not explain the misfit, up to `starts`
     /// (descend_by_walks), weighed by what the residuals say of the model's resolution.
     SearchResult descend(int starts, const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
+    /// The same from the study's initial values, and from others where these do not explain the data.
+    SearchResult descend(const std::function<void(const std::string&)>& stage);
 
     /// By the study's method, from `initial`. Where runs go from equilibrium to equilibrium it goes on from the best one, weighed
     /// by what the residuals say of the model's resolution, as `descend` does; else the resolution is what it is at worst.

@@ -34,7 +34,8 @@ struct Nearby {
 /// algorithm 6.1.1). The model is searched from several points, so that a curve with jumps does not easily catch it in a side
 /// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where
 /// the misfit is below `enough`. It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as
-/// the noise does not explain the misfit. Where ways differ it starts from the lowest of some more such points anyway.
+/// the noise does not explain the misfit (residuals above two sigma). Where ways differ it starts from the lowest of some more
+/// such points anyway.
 SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
                               const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage);

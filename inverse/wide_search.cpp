@@ -36,8 +36,7 @@ bool WideSearch::descend(const std::function<void(const std::string&)>& stage) {
         runs_.reset();
         return false;
     }
-    runs_->descend(study_.optimizer.starts, runs_->model().box().initial(),
-                   [&](const std::string& name) { stage(name + " on cells twice as wide"); });
+    runs_->descend([&](const std::string& name) { stage(name + " on cells twice as wide"); });
     return runs_->objective().best() != nullptr;
 }
 

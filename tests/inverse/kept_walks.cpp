@@ -106,6 +106,40 @@ TEST(UnitKeptWalks, AnotherUnitOfStressIsOnTheSameWalk) {
     EXPECT_NEAR(second.driving[1].toughness, 1.7 * first.driving[1].toughness, 1e-9);
 }
 
+// The exponents of the density laws are numbers of the wood like moduli: runs near a walk move by its derivatives.
+TEST(GradientKeptWalks, ByTheDensityLaws) {
+    Scene scene = across_inclined_rings(GrowthDirection::straight);
+    scene.specimen.rings->transition = 1.0e-3;
+    scene.specimen.density_exponents.E = 2.0;
+    Study study = toughness_study(scene);
+    Parameter exponent;
+    exponent.keys = {"specimen.density_exponents.E"};
+    exponent.initial = 2.0;
+    study.parameters.push_back(exponent);
+    const KeptWalks walks(study);
+    ASSERT_TRUE(walks.has_exact_slopes());
+    const auto critical_force = [](const Record& record) {
+        std::vector<double> forces;
+        for (const auto& row : record.driving) forces.push_back(row.force);
+        return forces;
+    };
+    const std::vector<double> base = critical_force(walks.exact()(scene, nullptr));
+    const Forward near = walks.near({100.0, 100.0, 2.0});
+    for (const double step : {-0.02, 0.02}) {
+        scene.specimen.density_exponents.E = 2.0 + step;
+        const std::vector<double> moved = critical_force(near(scene, nullptr)), exact = critical_force(simulate(scene));
+        ASSERT_EQ(moved.size(), exact.size());
+        double change = 0, off = 0;
+        for (std::size_t i = 0; i < exact.size(); ++i) {
+            change = std::max(change, std::abs(exact[i] / base[i] - 1));
+            off = std::max(off, std::abs(moved[i] - exact[i]) / base[i]);
+        }
+        std::printf("exponent %+.2f: forces change by up to %.2e, runs nearby are within %.1e\n", step, change, off);
+        EXPECT_GT(change, 5e-4);
+        EXPECT_LT(off, 0.05 * change);
+    }
+}
+
 // What was put off is done, in its order, where something goes on from the same walks, and not where these were given up since.
 TEST(UnitKeptWalks, WorkPutOffIsDoneWhereItsWalksGoOn) {
     Study study = toughness_study(across_inclined_rings(GrowthDirection::normal_to_opening));
