@@ -23,8 +23,8 @@ constexpr double resolved = 1e-3;
 // cell, nor slopes at the best point for the way there.
 constexpr double farthest_told = 0.1;
 
-// What is left where two grids happen to agree: of a toughness, and of an experiment's stiffness.
-constexpr double least_of_toughness = 0.01, least_of_stiffness = 0.002;
+// Of a toughness: what is left where two grids happen to agree.
+constexpr double least_of_toughness = 0.01;
 
 bool is_toughness(const Parameter& parameter) {
     return std::ranges::any_of(parameter.keys, [](const std::string& key) { return key.ends_with(".toughness"); });
@@ -47,8 +47,8 @@ bool is_whole_box(const Parameter& parameter, const FittedParameter& fitted) {
 // A shift [SI] of a parameter from a value, as a part of it, or in its unit where the value may be near 0.
 std::string shift_text(const Parameter& parameter, double value, double shift) {
     return size_of(parameter, value) > std::abs(value)
-               ? fmt::format("'{}' {:.2g} {}", parameter.name, shift / parameter.unit_factor, parameter.unit)
-               : fmt::format("'{}' {:.2g} %", parameter.name, 100 * shift / value);
+               ? fmt::format("'{}' {:+.2g} {}", parameter.name, shift / parameter.unit_factor, parameter.unit)
+               : fmt::format("'{}' {:+.2g} %", parameter.name, 100 * shift / value);
 }
 
 // Moves the end of an interval on by a part of the box, within it.
@@ -71,17 +71,17 @@ void add_covariance(Fit& fit, const Eigen::MatrixXd& more) {
     fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
 }
 
-Eigen::MatrixXd least_squares(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& changes) {
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorXd& change) {
     const Eigen::VectorXd scale = slope.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
     factors.setThreshold(resolved);
     factors.compute(slope * scale.asDiagonal());
-    return scale.asDiagonal() * factors.solve(changes);
+    return scale.cwiseProduct(factors.solve(change));
 }
 
 }  // namespace
 
-Eigen::MatrixXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
     const Eigen::VectorXd values = model.box().values(best.x);
     Evaluation here = *best.evaluation;
     const std::vector<FitResidual> before = model.residuals(here);
@@ -90,43 +90,32 @@ Eigen::MatrixXd left_by_grid(const Study& study, StudyModel model, const Run& be
     model.weigh(wide, values);
     const std::vector<FitResidual> after = model.residuals(here);
     std::map<std::string, double> share;
-    std::map<std::string, Eigen::Index> column;
     for (const Experiment& experiment : study.experiments) {
         // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
         share[experiment.name] = has_two_grids(experiment) ? 0.75 : 1.0;
-        column[experiment.name] = static_cast<Eigen::Index>(share.size());
     }
-    Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(here.residuals.size(), 1 + static_cast<Eigen::Index>(share.size()));
-    changes.col(0) = wide.residuals - here.residuals;
+    Eigen::VectorXd change = wide.residuals - here.residuals;
     Eigen::MatrixXd slope = about.slope;
     for (std::size_t i = 0; i < before.size(); ++i) {  // priors, which follow, know of no grid
         const auto row = static_cast<Eigen::Index>(i);
-        const FitResidual& station = after[i];
-        slope.row(row) *= before[i].sigma / station.sigma;
-        changes(row, 0) *= share.at(station.experiment);
-        const double by_stiffness = station.kind == "force" ? 1.0 : station.kind == "arrival" ? -0.5 : 0.0;
-        changes(row, column.at(station.experiment)) = least_of_stiffness * by_stiffness * station.modelled / station.sigma;
+        slope.row(row) *= before[i].sigma / after[i].sigma;
+        change[row] *= share.at(before[i].experiment);
     }
-    return least_squares(slope, changes);
+    return least_squares(slope, change);
 }
 
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::MatrixXd left) {
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left) {
     const Eigen::VectorXd values = box.values(x);
+    const Eigen::VectorXd shifts = box.values(x + left) - values;
     bool is_near = true;
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
-        if (is_toughness(parameter)) {
-            const double least = least_of_toughness * values[j] / box.slope(j, x[j]), all = left.row(j).norm();
-            if (all > 0) left.row(j) *= std::max(1.0, least / all);
-            else left(j, 0) = least;
-        }
         if (is_whole_box(parameter, fit.parameters[static_cast<std::size_t>(j)])) {
             continue;
         }
-        const double shift = std::abs(box.value(j, x[j] + left.row(j).norm()) - values[j]);
-        is_near = is_near && shift <= farthest_told * size_of(parameter, values[j]);
-        told.push_back(shift_text(parameter, values[j], shift));
+        is_near = is_near && std::abs(shifts[j]) <= farthest_told * size_of(parameter, values[j]);
+        told.push_back(shift_text(parameter, values[j], shifts[j]));
     }
     if (told.empty()) {
         return;
@@ -136,21 +125,25 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen:
         take_in_untold_grid(fit, box, x, why + fmt::format("{}", fmt::join(told, ", ")));
         return;
     }
-    Eigen::MatrixXd own = left;  // in the parameters' units
+    Eigen::VectorXd own(box.size());  // in the parameters' units
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
-        go_on(box, j, fitted.lower_95, -left.row(j).norm());
-        go_on(box, j, fitted.upper_95, left.row(j).norm());
-        own.row(j) *= slope_in_unit(box, j, x);
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        if (is_toughness(parameter)) {
+            const double least = least_of_toughness * values[j] / box.slope(j, x[j]);
+            left[j] = std::copysign(std::max(std::abs(left[j]), least), left[j]);
+        }
+        go_on(box, j, fitted.lower_95, -std::abs(left[j]));
+        go_on(box, j, fitted.upper_95, std::abs(left[j]));
+        own[j] = slope_in_unit(box, j, x) * left[j];
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
     add_covariance(fit, own * own.transpose() / 3.0);  // the mean square of what is spread evenly from 0 to 1
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
     fit.message +=
-        fmt::format("By what the grid leaves, told by a run on cells twice as wide, and {:.1g} % of each experiment's stiffness, "
-                    "the truth may lie farther off by: {}. Intervals take that in on both sides, of a toughness 1 % at least; it "
-                    "makes up to {:.0f} % of a variance. ",
-                    100 * least_of_stiffness, fmt::join(told, ", "), 100 * most);
+        fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
+                    "Intervals take that in on both sides, of a toughness 1 % at least; it makes up to {:.0f} % of a variance. ",
+                    fmt::join(told, ", "), 100 * most);
 }
 
 void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why) {

@@ -13,22 +13,19 @@ namespace crampfit {
 /// them (StudyModel::likely_resolution): else single stations beside a jump had the say. Of an error that the finer of two grids
 /// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,
 /// Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116), which takes in errors that go
-/// with the first power of the cell. A scene that takes a third of the difference of both grids off has moved away from the wide
-/// one by four thirds of that difference: there three quarters of g count. Found: how far the truth may lie from the best point
-/// to either side [parameters x 1 + experiments, of the unit cube], by that and by what two grids need not show, 0.2 % of the
-/// stiffness of each experiment by itself (docs/accuracy.md): force goes with it, and arrivals with the root of its inverse.
-/// Experiments that differ by so little may ask for a modulus that is several per cent off.
+/// with the first power of the cell. Found: how far the truth may lie from the best point to either side [parameters, of the unit
+/// cube]. A scene that takes a third of the difference of both grids off has moved away from the wide
+/// one by four thirds of that difference: there three quarters of g count.
 ///
 /// `about` tells of the best point.
-Eigen::MatrixXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
+Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);
 
-/// Takes what the grid leaves into the fit: each interval goes on by the root of its squares to either side, and covariance and
-/// standard errors count each part as spread evenly up to there, squares about the best point. Of a toughness two grids that
-/// happen to agree leave 1 % all the same: loads into another wood are off by up to 0.7 % then (docs/accuracy.md), and toughness
-/// goes with their square. Where it goes beyond a tenth of a parameter's value or, on a linear scale, of half its box if that is
-/// more, it cannot be told. Of a parameter that the data do not tell, whose interval is its whole box, nothing is asked. The
-/// message says it.
-void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::MatrixXd left);
+/// Takes what the grid leaves into the fit: each interval goes on by it to either side, and covariance and standard errors count
+/// it as spread evenly up to there, squares about the best point. Of a toughness two grids that happen to agree leave 1 % all the
+/// same: loads into another wood are off by up to 0.7 % then (docs/accuracy.md), and toughness goes with their square. Where it
+/// goes beyond a tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told. Of a
+/// parameter that the data do not tell, whose interval is its whole box, nothing is asked. The message says it.
+void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left);
 
 /// Where what the grid leaves cannot be told, and why: all intervals go on by that tenth to either side, and errors spread evenly
 /// up to there count, each parameter's by itself.
