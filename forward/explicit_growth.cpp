@@ -69,7 +69,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     Vec2 direction = tip.direction;
     const GrowthDirection criterion = scene_.cracks[crack].direction;
     const bool by_intensities = steered_by_intensities(criterion);
-    const double leg = (by_intensities ? least_leg_in_cells : leg_in_cells) * cell;
+    const double leg = (by_intensities ? least_leg_in_cells(cracks_.lines[crack], at_end) : leg_in_cells) * cell;
     if (state.since_turn >= leg) {
         TipLoad load = load_at(crack, at_end);
         load.opening = state.opening;

@@ -111,6 +111,15 @@ bool steered_by_intensities(GrowthDirection criterion) {
     return criterion == GrowthDirection::hoop_stress || criterion == GrowthDirection::energy_release_rate;
 }
 
+double least_leg_in_cells(const CrackLine& line, bool at_end) {
+    constexpr double usual = 1.0, after_sharp_turn = 1.5, sharp = 20.0 * std::numbers::pi / 180.0;
+    const std::vector<Vec2>& x = line.points;
+    if (x.size() < 3) return usual;
+    const std::size_t corner = at_end ? x.size() - 2 : 1;
+    const Vec2 before = x[corner] - x[corner - 1], after = x[corner + 1] - x[corner];
+    return std::abs(std::atan2(cross(before, after), before.dot(after))) > sharp ? after_sharp_turn : usual;
+}
+
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,
                       double increment) {
     constexpr double rounding = 1e-7;  // [rad]; a crack on a line of symmetry, often one of the grid, would leave it by a hair

@@ -15,10 +15,11 @@ Vec2 branch_intensities(double angle, double K_I, double K_II);
 /// Whether K_I and K_II steer a crack.
 bool steered_by_intensities(GrowthDirection criterion);
 
-/// They say how it goes on once it has gone straight for so many cells: a shorter leg is one that the grid hardly sees. After a
-/// turn by 40 degrees in mode I, K_II is 0.70 K_0 half a cell on and 0.46 a cell on, where a short branch has 0.30 and one of
-/// that length 0.39 (Amestoy and Leblond 1992): a crack that heeds it turns back by more than it should, from leg to leg.
-inline constexpr double least_leg_in_cells = 1.5;
+/// How far a crack that they steer goes straight after its last turn, in cells: a shorter leg is one that the grid hardly sees.
+/// After a turn by 40 degrees in mode I, K_II is 0.70 K_0 half a cell on, 0.46 a cell on, and 0.41 a cell and a half on, where a
+/// branch has 0.30 to 0.40 (Amestoy and Leblond 1992): a crack that heeds it turns back by more than it should, from leg to leg.
+/// After turns of up to 20 degrees a cell will do, where these are 0.29, 0.23, 0.22 and 0.17 to 0.22.
+double least_leg_in_cells(const CrackLine& line, bool at_end);
 
 /// Which way a crack tip goes on: a unit vector. The next `increment` [m] is what "energy release rate" weighs toughness over.
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, const TipLoad& load, const MaterialMap& materials,

@@ -83,7 +83,7 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
     const double way = 0.25 * quarters * growing.increment;
     const double cell = body_.layout.cell.maxCoeff();
-    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (least_leg_in_cells - 1e-6) * cell)
+    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (least_leg_in_cells(line, growing.at_end) - 1e-6) * cell)
         return tip.position + way * tip.direction;
     const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
     return tip.position + way * growth_direction(criterion, tip, load, materials_, std::max(growing.increment, cell));
