@@ -206,7 +206,7 @@ Vec2 spread_of(const Vec2& points) { return (1.0 - points.array().square().inver
 }  // namespace
 
 Unevenness Discretisation::unevenness_of(const MaterialMap& materials, WoodArea& cell, const LocalWood& average) const {
-    return materials.unevenness(cell, average, spread_of(Vec2::Constant(layout.per_side)));
+    return materials.unevenness(cell, average, Vec2::Ones());
 }
 
 Unevenness Discretisation::unevenness_of(const MaterialMap& materials, int c, const PointBox& box,
@@ -232,6 +232,7 @@ void Discretisation::place_points(const Scene& scene, const MaterialMap& materia
         const LocalWood wood = materials.average(area);
         const Eigen::Matrix3d C = wood.elasticity.stiffness();
         points.stiffness.push_back({C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)});
+        points.moduli.push_back(wood.filled > 0.0 ? uniaxial_moduli(C) : Vec2::Zero());
         const auto nodes = layout.cell_nodes(c);
         const int kind =
             kind_of_cell(c % layout.cells_x, layout.cells_x) + kinds_of_cells * kind_of_cell(c / layout.cells_x, layout.cells_y);
@@ -281,6 +282,14 @@ void Discretisation::check_parts(const Scene& scene) const {
             known = points.part[p];
         }
     }
+}
+
+bool Discretisation::cell_is_whole(int c) const {
+    if (!cell_is_full_[c]) return false;
+    const int first = points.first_of_cell[c];
+    for (int p = first + 1; p < points.first_of_cell[c + 1]; ++p)
+        if (!points.node.same(p, first)) return false;
+    return true;
 }
 
 int Discretisation::point_at(const Vec2& x) const {

@@ -101,6 +101,7 @@ struct Points {
     std::vector<std::uint16_t> slot;               // which of the discretisation's `weights` are its own
     PointTable<int> node;                          // the velocity fields it belongs to at the nodes that its cell sees
     std::vector<std::array<double, 6>> stiffness;  // [cells] stress from strain: xx,xx; xx,yy; yy,yy; xy,xy; xx,xy; yy,xy [Pa]
+    std::vector<Vec2> moduli;                      // [cells] of it, `uniaxial_moduli` [Pa]
     std::vector<Eigen::Vector4d>
         layers;                         // coefficients of LayeredElasticity; empty where all wood is the same or some orthotropic
     std::vector<double> volume;         // [m^3]
@@ -164,6 +165,7 @@ class Discretisation {
     /// Shape functions of the nodes that a cell sees at x, which may lie outside the cell: they go on as they do in it.
     std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
+    bool cell_is_whole(int c) const;                             // full, and no crack between its points
     int point_at(const Vec2& x) const;                           // the point whose domain holds x, or -1
     WoodArea area_of_cell(int c) const { return {layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell}; }
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;                                       // on average

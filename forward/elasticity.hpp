@@ -35,6 +35,9 @@ inline Eigen::Matrix3d in_axes(const Eigen::Matrix3d& stiffness, const Vec2& axi
     return from_axes(stiffness, Vec2(axis.x(), -axis.y()));
 }
 
+/// Stress along x per strain along x where there is no other stress, and the same along y [Pa].
+Vec2 uniaxial_moduli(const Eigen::Matrix3d& stiffness);
+
 /// Elasticity of a small area that layers may cross. With n normal to the layers and s along them, s_nn, s_ns and e_ss are common
 /// to all layers. The energy as a function of these,
 ///     Y = 1/2 [E' e_ss^2 + 2 (r s_nn + p s_ns) e_ss - a s_nn^2 - b s_ns^2 - 2 c s_nn s_ns],

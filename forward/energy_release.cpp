@@ -205,7 +205,7 @@ ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, con
     double sum = 0.0;
     double change_along = 0.0, change = 0.0;  // explicit gradients of the energy [J/m]
     for_points_in(body, tip, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
-        const Mat2 u_gradient = gradient_at(body, p, nodal.displacement);
+        const Mat2 u_gradient = seen_gradient_at(body, p, nodal.displacement, rotates);
         const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
         const Vec2 v = value_at(body, p, nodal.velocity) - as_a_whole;
         const Vec2 a = value_at(body, p, nodal.acceleration);
@@ -303,7 +303,7 @@ struct Seen {
 
 // From the frame that has turned with the wood around the tip.
 Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const Mat2& turn, bool rotates) {
-    const Mat2 gradient = gradient_at(body, p, nodal.displacement);
+    const Mat2 gradient = seen_gradient_at(body, p, nodal.displacement, rotates);
     const PointState state = elastic_state(gradient, body.points.stiffness_of(p), rotates);
     Seen seen;
     seen.strain = state.strain;

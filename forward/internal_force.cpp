@@ -31,7 +31,7 @@ void InternalForce::sort_cells() {
             return count;
         };
         const bool remembers = history_ && history_->is_in(c);
-        if (!remembers && body_.cell_is_full(c) && alike(first) == last - first) {
+        if (!remembers && body_.cell_is_whole(c)) {
             whole_cells_.push_back(c);
         } else {
             for (int p = first; p < last; ++p) {
@@ -58,6 +58,7 @@ double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stif
 struct InternalForce::OwnWood {
     const Discretisation& body;
     const std::array<double, 6>& stiffness(int cell) const { return body.points.stiffness[cell]; }
+    const Vec2& moduli(int cell) const { return body.points.moduli[cell]; }
     const Unevenness& unevenness(const UnevenCells::Piece& piece) const { return *piece.wood; }
     double of_alone(const Alone& alone) const { return alone.stiffness; }
     static constexpr bool has(int) { return true; }
@@ -70,6 +71,7 @@ struct InternalForce::ChangeOfWood {
         const Eigen::Matrix3d& C = number.stiffness(cell);
         return {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
     }
+    const Vec2& moduli(int cell) const { return number.moduli(cell); }
     const Unevenness& unevenness(const UnevenCells::Piece& piece) const { return number.unevenness(piece.cell, piece.box); }
     double of_alone(const Alone& alone) const {
         return force.crosswise_stiffness(alone.point, number.stiffness(force.body_.points.cell[alone.point]));
@@ -77,9 +79,71 @@ struct InternalForce::ChangeOfWood {
     bool has(int cell) const { return !number.stiffness(cell).isZero(0.0); }
 };
 
-template <int Nodes, int PointsPerCell, bool Rotates, class Wood>
-double InternalForce::visit_cells_of(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
-                                     Wanted wanted, std::vector<Vec2>* force) const {
+// Of a whole cell, by d = h_x h_y q [N/m].
+Vec2 InternalForce::bending_stiffness(const Vec2& moduli) const {
+    const Vec2& cell = body_.layout.cell;
+    return body_.layout.thickness / 12.0 * Vec2(cell.y() / cell.x() * moduli.x(), cell.x() / cell.y() * moduli.y());
+}
+
+// `BilinearPiece` without coupling, written out.
+template <bool Rotates, class Wood>
+double InternalForce::visit_whole_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
+                                        Wanted wanted, std::vector<Vec2>* force) const {
+    const Points& points = body_.points;
+    const Vec2 half_slope = 0.5 * body_.layout.cell.cwiseInverse();
+    const double volume = body_.layout.cell.prod() * body_.layout.thickness;
+    double energy = 0.0;
+    for (const int c : cells) {
+        if (!wood.has(c)) continue;
+        const auto node = points.node[points.first_of_cell[c]];
+        const Vec2 &u0 = displacement[node[0]], &u1 = displacement[node[1]], &u2 = displacement[node[2]], &u3 = displacement[node[3]];
+        const Vec2 rising = u3 - u0, falling = u1 - u2;
+        const Vec2 by_x = half_slope.x() * (rising + falling), by_y = half_slope.y() * (rising - falling);  // du_i / dX_j
+        Vec2 d = u0 - u1 - u2 + u3;
+        double strain_xx = by_x.x(), strain_yy = by_y.y(), shear = by_x.y() + by_y.x(), cosine = 1.0, sine = 0.0, scale = 0.0;
+        if constexpr (Rotates) {
+            const double c_part = 2.0 + by_x.x() + by_y.y();
+            const double s_part = by_x.y() - by_y.x();
+            scale = 1.0 / std::sqrt(c_part * c_part + s_part * s_part);
+            cosine = c_part * scale;
+            sine = s_part * scale;
+            strain_xx = cosine * (1.0 + by_x.x()) + sine * by_x.y() - 1.0;
+            strain_yy = cosine * (1.0 + by_y.y()) - sine * by_y.x() - 1.0;
+            shear = 2.0 * (cosine * by_y.x() + sine * (1.0 + by_y.y()));
+            d = {cosine * d.x() + sine * d.y(), cosine * d.y() - sine * d.x()};
+        }
+        const auto& C = wood.stiffness(c);
+        const double local_xx = volume * (C[0] * strain_xx + C[1] * strain_yy + C[4] * shear);
+        const double local_yy = volume * (C[1] * strain_xx + C[2] * strain_yy + C[5] * shear);
+        const double local_xy = volume * (C[4] * strain_xx + C[5] * strain_yy + C[3] * shear);
+        Vec2 pull = bending_stiffness(wood.moduli(c)).cwiseProduct(d);
+        if (wanted != Wanted::forces)
+            energy += 0.5 * (local_xx * strain_xx + local_yy * strain_yy + local_xy * shear + pull.dot(d));
+        if (wanted == Wanted::energy) continue;
+        Vec2 along_x(local_xx, local_xy), along_y(local_xy, local_yy);  // columns of the stress
+        if constexpr (Rotates) {
+            const double skew = scale * (0.5 * shear * (local_yy - local_xx) + (strain_xx - strain_yy) * local_xy +
+                                         pull.y() * d.x() - pull.x() * d.y());
+            const double upper = local_xy + skew, lower = local_xy - skew;
+            along_x = {cosine * local_xx - sine * lower, sine * local_xx + cosine * lower};
+            along_y = {cosine * upper - sine * local_yy, sine * upper + cosine * local_yy};
+            pull = {cosine * pull.x() - sine * pull.y(), sine * pull.x() + cosine * pull.y()};
+        }
+        along_x *= half_slope.x();
+        along_y *= half_slope.y();
+        const Vec2 sum = along_x + along_y, difference = along_x - along_y;
+        (*force)[node[0]] -= pull - sum;
+        (*force)[node[1]] -= difference - pull;
+        (*force)[node[2]] += difference + pull;
+        (*force)[node[3]] -= pull + sum;
+    }
+    return energy;
+}
+
+template <int PointsPerCell, bool Rotates, class Wood>
+double InternalForce::visit_splines(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
+                                    Wanted wanted, std::vector<Vec2>* force) const {
+    constexpr int Nodes = 9;
     using Lane = Eigen::Array<double, PointsPerCell, 1>;  // the cell's points side by side
     const Points& points = body_.points;
     std::array<Lane, Nodes> slope_x, slope_y;
@@ -151,13 +215,12 @@ double InternalForce::visit_cells_of(std::span<const int> cells, const Wood& woo
 template <class Wood>
 double InternalForce::visit_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement,
                                   Wanted wanted, std::vector<Vec2>* force) const {
-    const auto visit = [&]<int Nodes, int PointsPerCell>() {
-        return rotates_ ? visit_cells_of<Nodes, PointsPerCell, true>(cells, wood, displacement, wanted, force)
-                        : visit_cells_of<Nodes, PointsPerCell, false>(cells, wood, displacement, wanted, force);
-    };
+    if (body_.layout.degree == 1)
+        return rotates_ ? visit_whole_cells<true>(cells, wood, displacement, wanted, force)
+                        : visit_whole_cells<false>(cells, wood, displacement, wanted, force);
     const auto with = [&]<int PointsPerCell>() {
-        return body_.layout.degree == 1 ? visit.template operator()<4, PointsPerCell>()
-                                        : visit.template operator()<9, PointsPerCell>();
+        return rotates_ ? visit_splines<PointsPerCell, true>(cells, wood, displacement, wanted, force)
+                        : visit_splines<PointsPerCell, false>(cells, wood, displacement, wanted, force);
     };
     switch (body_.layout.per_side) {
     case 1:
@@ -265,10 +328,26 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const s
                                                    bool geometric) const {
     const int cell = body_.points.cell[first];
     if (history_ && history_->is_in(cell)) return remembering_tangent({first, count}, displacement, geometric);
+    if (body_.layout.degree == 1 && body_.cell_is_whole(cell)) return whole_tangent(cell, displacement, geometric);
     Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
     for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1))
         if (piece.point >= first && piece.point < first + count) sum += uneven_.tangent(piece, displacement, geometric);
     return sum;
+}
+
+Eigen::Matrix<double, 8, 8> InternalForce::whole_tangent(int cell, const std::vector<Vec2>& displacement, bool geometric) const {
+    const Layout& layout = body_.layout;
+    const int first = body_.points.first_of_cell[cell];
+    const double area = layout.cell.prod();
+    BilinearPiece::Wood wood;
+    wood.S = layout.thickness * area * body_.points.stiffness_of(first);
+    wood.H = bending_stiffness(body_.points.moduli[cell]).asDiagonal();
+    for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1)) {
+        wood.G += layout.thickness * piece.wood->coupling;
+        wood.H += layout.thickness / area * piece.wood->bending;
+    }
+    return BilinearPiece(wood, Vec2::Constant(0.5), layout.cell, body_.points.node[first], displacement, rotates_)
+        .tangent(geometric);
 }
 
 Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,

@@ -11,8 +11,16 @@
 namespace crampfit {
 
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
-/// displacements, and those of uneven cells. Cells that hold all their points on common fields are taken a cell at a time, side
-/// by side; the others, next to a crack or a cutout, point by point.
+/// displacements, and those of uneven cells. Cells next to a crack or a cutout are taken point by point, with B-splines all.
+///
+/// Cells that hold all their points on common fields are taken as a whole (`BilinearPiece`): the strain in a cell's middle, and q =
+/// (u_0 - u_1 - u_2 + u_3) / (h_x h_y) by which the displacement gradient changes from there, (y - y_m) q in x and (x - x_m) q in
+/// y. Corners that move so bend the cell, which a bilinear displacement does not allow without shear, nor nearly incompressible
+/// wood at all. With its sides free to curve (incompatible modes of Wilson, Taylor, Doherty and Ghaboussi 1973; in rectangles the
+/// modes that Taylor, Beresford and Wilson 1976 give any quadrilateral are the same) what is left of the energy of q is that of
+/// stress along x and y alone,
+///     V/2 [h_y^2 / 12 E_x q_x^2 + h_x^2 / 12 E_y q_y^2],
+/// E_x and E_y as in `uniaxial_moduli`: the curvatures of the sides that minimise the energy drop out in closed form.
 ///
 /// A point that is alone in its cell on its four fields sees one gradient: fields that hardly another point carries could move
 /// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient
@@ -70,9 +78,14 @@ class InternalForce {
     template <class Wood>
     double visit_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
                        std::vector<Vec2>* force) const;
-    template <int Nodes, int PointsPerCell, bool Rotates, class Wood>
-    double visit_cells_of(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
-                          std::vector<Vec2>* force) const;
+    template <bool Rotates, class Wood>
+    double visit_whole_cells(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                             std::vector<Vec2>* force) const;
+    template <int PointsPerCell, bool Rotates, class Wood>
+    double visit_splines(std::span<const int> cells, const Wood& wood, const std::vector<Vec2>& displacement, Wanted wanted,
+                         std::vector<Vec2>* force) const;
+    Vec2 bending_stiffness(const Vec2& moduli) const;
+    Eigen::Matrix<double, 8, 8> whole_tangent(int cell, const std::vector<Vec2>& displacement, bool geometric) const;
     double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
     Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
                                                    bool geometric) const;

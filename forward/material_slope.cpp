@@ -50,6 +50,7 @@ std::vector<MaterialSlope> MaterialSlope::of(const std::vector<MaterialSlope>& w
 void MaterialSlope::look_at_cells(std::vector<MaterialSlope>& numbers, const Discretisation& body) {
     for (MaterialSlope& number : numbers) {
         number.stiffness_.assign(body.layout.cells(), Eigen::Matrix3d::Zero());
+        number.moduli_.assign(body.layout.cells(), Vec2::Zero());
         number.uneven_of_cell_.assign(body.layout.cells(), -1);
     }
     for (int c = 0; c < body.layout.cells(); ++c) {
@@ -57,7 +58,9 @@ void MaterialSlope::look_at_cells(std::vector<MaterialSlope>& numbers, const Dis
         WoodArea area = body.area_of_cell(c);
         for (MaterialSlope& number : numbers) {
             const LocalWood less = number.less_.average(area), more = number.more_.average(area);
-            number.stiffness_[c] = (more.elasticity.stiffness() - less.elasticity.stiffness()) / (2.0 * number.step_);
+            const Eigen::Matrix3d of_less = less.elasticity.stiffness(), of_more = more.elasticity.stiffness();
+            number.stiffness_[c] = (of_more - of_less) / (2.0 * number.step_);
+            if (of_more != of_less) number.moduli_[c] = (uniaxial_moduli(of_more) - uniaxial_moduli(of_less)) / (2.0 * number.step_);
             if (!more.mixed || !body.cell_is_full(c) || body.layout.degree > 1) continue;
             number.uneven_of_cell_[c] = static_cast<int>(number.uneven_.size());
             number.uneven_.push_back(

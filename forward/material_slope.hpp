@@ -23,6 +23,9 @@ class MaterialSlope {
     /// Stiffness of a cell's points [Pa / the number's unit].
     const Eigen::Matrix3d& stiffness(int cell) const { return stiffness_[cell]; }
 
+    /// `uniaxial_moduli` of a cell's points [Pa / the number's unit].
+    const Vec2& moduli(int cell) const { return moduli_[cell]; }
+
     /// Of a piece of an uneven cell.
     const Unevenness& unevenness(int cell, const PointBox& box) const;
 
@@ -43,6 +46,7 @@ class MaterialSlope {
     std::shared_ptr<const Scene> more_scene_, less_scene_;
     MaterialMap more_, less_;
     std::vector<Eigen::Matrix3d> stiffness_;  // [cells]
+    std::vector<Vec2> moduli_;                // [cells]
     const Discretisation* body_;
     std::vector<int> uneven_of_cell_;                                 // [cells] the place of its unevenness, or -1
     std::vector<Unevenness> uneven_;                                  // of whole cells

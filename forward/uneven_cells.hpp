@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/deformation.hpp"
+#include "forward/bilinear_piece.hpp"
 #include "forward/history.hpp"
 
 #include <map>
@@ -10,10 +10,8 @@
 namespace crampfit {
 
 /// What the wood of a cell with more than one adds to the energy of its points, which all have the cell's average stiffness, for
-/// where in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields. Most cells are
-/// one piece; a crack cuts them in several, each with its own wood. With F the gradient in a piece's middle, R its turn, c = u_0
-/// - u_1 - u_2 + u_3 of the cell's nodes, d = R^T c and e Biot's strain (without `rotates` the small strain and R = 1) its energy
-/// is e . S e / 2 + e . G d + d . H d / 2.
+/// where in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields (`BilinearPiece`).
+/// Most cells are one piece; a crack cuts them in several, each with its own wood.
 class UnevenCells {
   public:
     /// All must outlive this. Cells with a `history` have laws of their own; null: none has.
@@ -42,9 +40,8 @@ class UnevenCells {
     Eigen::Matrix<double, 8, 8> tangent(const Piece& piece, const std::vector<Vec2>& displacement, bool geometric) const;
 
   private:
-    struct Local;
     State small_state(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;  // small strain
-    Local local(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
+    BilinearPiece bilinear(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const;
     const Unevenness& wood_of(const Discretisation::UnevenCell& cell, const PointBox& box);
 
     const Discretisation& body_;
