@@ -157,9 +157,9 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
                 double freed = 0.0;
                 for (const CrackTip& end : ends[axis]) {
                     const double here = share_freed(x, end, layout);
-                    if (here > 0.0 && here < 1.0) {
+                    if (here >= least_freed_at_rest && here < 1.0) {
                         near = &end;
-                        freed = std::max(here, least_freed_at_rest);
+                        freed = here;
                     }
                 }
                 if (near) {

@@ -142,7 +142,7 @@ TEST(VerificationBridging, GAtTheTipIsWhatBridgesLeave) {
     const double u = 82e-6, speed = 0.1, half_height = 4e-3, cell = 0.2e-3;
     const double far = 40e6 * (1 - 0.33) / (1.33 * 0.34) * u * u / half_height;
     const Bridging law{0.5e6, 0.15e-3, true};
-    for (const auto& [tip, lift] : {std::pair{16.03e-3, 0.0}, {16.1e-3, 0.3}, {15.95e-3, 0.5}}) {
+    for (const auto& [tip, lift] : {std::pair{16.03e-3, 0.0}, {16.1e-3, 0.3}, {15.96e-3, 0.5}}) {
         Scene scene = strip(cell, 0.0, speed, law);
         scene.specimen.size = {32e-3, 2 * half_height};
         for (Edge& edge : scene.edges) edge.until = u / speed;

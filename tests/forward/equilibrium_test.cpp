@@ -203,6 +203,29 @@ TEST(UnitInternalForce, UnevenCellsFeelNoRotation) {
     EXPECT_NEAR(internal.energy(displacement), energy, 1e-10 * energy);
 }
 
+TEST(UnitInternalForce, ARowOfCellsBendsAsABeam) {
+    // Pure bending by the curvature k, exact in a row of single cells: u_x = k x (y - h/2), u_y = -k x^2 / 2 at the nodes, whose
+    // energy is that of the bending moment, E' (h^3 / 12) k^2 / 2 a length, whatever Poisson's ratio and the cells' shape.
+    for (const double poisson_ratio : {0.0, 0.33, 0.499})
+        for (const double length : {6e-3, 15e-3})
+            for (const int points : {1, 4, 9}) {
+                Scene scene = block({length, 1e-3}, 1e-3);
+                scene.materials["EW"].poisson_ratio = poisson_ratio;
+                scene.model.points_per_cell = points;
+                const MaterialMap materials(scene);
+                const Discretisation body(scene, materials, Layout::of(scene, {length / 6, 1e-3}));
+                const double curvature = 1e-2, h = 1e-3;
+                std::vector<Vec2> displacement;
+                for (int n = 0; n < body.layout.nodes(); ++n) {
+                    const Vec2 x = body.layout.node_position(n);
+                    displacement.emplace_back(curvature * x.x() * (x.y() - h / 2), -curvature * x.x() * x.x() / 2);
+                }
+                const double modulus = 40e6 / (1 - poisson_ratio * poisson_ratio);
+                const double exact = modulus * h * h * h / 12 * curvature * curvature / 2 * length * scene.model.thickness;
+                EXPECT_NEAR(InternalForce(body, materials, false).energy(displacement), exact, 1e-9 * exact);
+            }
+}
+
 // A grid whose nodes have so many equations each, every cell with a random element that is positive definite.
 struct RandomGrid {
     int cells_x, cells_y;
@@ -341,7 +364,7 @@ std::array<double, 3> shares_of_a_cell(double poisson_ratio, double lift) {
     scene.measure = {"top", "top"};
     scene.stop.time = 1.0;
     const double y = (15.0 + lift) * h;
-    const double start = (20.0 - 0.25) * h;  // where the tip starts to free a pair: see `tip_lag` in forward/cracks.cpp
+    const double start = (20.0 - 0.29) * h;  // where the tip starts to free a pair: see `tip_lag` in forward/cracks.cpp
     Crack crack;
     crack.points = {Vec2(0.0, y), Vec2(start, y)};
     scene.cracks = {crack};
@@ -528,8 +551,9 @@ TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
 }
 
 TEST(VerificationEquilibrium, IsWhereDampedMotionComesToRest) {
-    // The one discretisation by two solvers; motion has died out to 1e-5 when the explicit run ends.
-    const Scene scene = ring_specimen(3e-3, 0.5e-3);
+    // The one discretisation by two solvers; motion has died out to 1e-5 when the explicit run ends. The tip has gone a quarter of its
+    // way past the nodes beside it: ties of less are stiffer than a time step affords, and begin with slack (`TipTies`).
+    const Scene scene = ring_specimen(3.02e-3, 0.5e-3);
     Trial moved(scene);
     moved.until(*scene.stop.time);
     StaticTrial rest(at_equilibrium(scene));

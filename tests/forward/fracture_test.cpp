@@ -156,6 +156,47 @@ TEST(VerificationEnergy, JIsTheChangeOfEnergyAmongRings) {
     }
 }
 
+// What an edge crack of 8 mm, and a part of a cell, in a square of 16 mm holds between grips that let it go aside: its energy per
+// thickness [J/m], and its energy release rate.
+double energy_of_edge_crack(double cell, double nu, const Vec2& tip, double* rate = nullptr) {
+    Scene scene = block({16e-3, 16e-3}, cell);
+    scene.materials["EW"].poisson_ratio = nu;
+    scene.edges = {without(moving("top", Side::top, {0.0, 1e-3}), 0), without(moving("bottom", Side::bottom, {0.0, 0.0}), 0),
+                   without(moving("right", Side::right, {0.0, 0.0}), 1)};
+    scene.edges[2].range = {{0.0, 1e-5}};
+    Crack crack;
+    crack.points = {Vec2(0.0, tip.y()), tip};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 0.1;
+    StaticTrial run(at_equilibrium(scene), false);
+    EXPECT_TRUE(run.solve(*scene.stop.time));
+    if (rate) *rate = run.equilibrium.load_at(0, true).G;
+    return run.equilibrium.potential() / scene.model.thickness;
+}
+
+TEST(VerificationEnergy, TheCrackOfAGridIsAsLongAsDrawn) {
+    // Of the energy's error the part that goes with the first power of the cell is G times how much longer the grid's crack is. The
+    // energy of a perfect grid is that of two finer ones with that part taken off.
+    constexpr double h = 0.5e-3;
+    for (const double nu : {0.0, 0.33, 0.45})
+        for (const double lift : {0.0, 0.5}) {
+            double longest = -1.0, shortest = 1.0;
+            for (const double shift : {0.0, 0.25, 0.5, 0.75}) {
+                const Vec2 tip(8e-3 + shift * h, 8e-3 + lift * h);
+                double G = 0.0;
+                const double exact = 2.0 * energy_of_edge_crack(h / 4, nu, tip, &G) - energy_of_edge_crack(h / 2, nu, tip);
+                const double longer = (exact - energy_of_edge_crack(h, nu, tip)) / (G * h);
+                longest = std::max(longest, longer);
+                shortest = std::min(shortest, longer);
+            }
+            std::printf("nu = %.2f, crack %.1f cells above a line of the grid: %+.3f to %+.3f cells longer than drawn\n", nu, lift,
+                        shortest, longest);
+            // One twentieth of a cell is 0.5 % of the length of a crack of ten cells.
+            EXPECT_LT(std::max(longest, -shortest), 0.05) << nu << " " << lift;
+        }
+}
+
 TEST(UnitCrackFaces, TouchButDoNotPassInMotion) {
     // Pressed together, a cracked block is as stiff as a whole one; faces overlap by what their penalty yields.
     double force[2];

@@ -25,15 +25,15 @@ Matrix stiffness(const AtRest& run) {
     const auto add = [&](int row, int column, double value) {
         if (equation[row] >= 0 && equation[column] >= 0) entries.emplace_back(equation[row], equation[column], value);
     };
-    for (int p = 0; p < points.count(); ++p) {
-        const CellWeights& w = run.body.weights[points.slot[p]];
-        Eigen::Matrix<double, 3, 8> B;
-        for (int k = 0; k < 4; ++k) B.block<3, 2>(0, 2 * k) << w.slope_x[k], 0, 0, w.slope_y[k], w.slope_y[k], w.slope_x[k];
-        const Eigen::Matrix<double, 8, 8> K = points.volume[p] * B.transpose() * points.stiffness_of(p) * B;
-        for (int a = 0; a < 8; ++a)
-            for (int b = 0; b < 8; ++b) add(2 * points.node[p][a / 2] + a % 2, 2 * points.node[p][b / 2] + b % 2, K(a, b));
-    }
     const InternalForce internal(run.body, run.materials, false);
+    const std::vector<Vec2> still(cracks.fields(), Vec2::Zero());
+    for (int c = 0; c < run.body.layout.cells(); ++c)
+        for_groups(points, c, [&](const PointGroup& group) {
+            const Eigen::Matrix<double, 8, 8> K = internal.tangent(group.first, group.count, still, false);
+            const auto node = points.node[group.first];
+            for (int a = 0; a < 8; ++a)
+                for (int b = 0; b < 8; ++b) add(2 * node[a / 2] + a % 2, 2 * node[b / 2] + b % 2, K(a, b));
+        });
     for (const auto& alone : internal.alone()) {
         const auto node = points.node[alone.point];
         const auto& sign = crosswise_sign;

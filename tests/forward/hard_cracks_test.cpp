@@ -227,11 +227,7 @@ TEST(HardContrast, LayersInARowWhereverTheyLieInTheCells) {
 // ---- nearly incompressible
 
 TEST(HardPoisson, CentreCrackAtNearlyHalf) {
-    // Missed: cells of four points lock as the wood gets incompressible. The gates stand at what is reached.
-    struct Reached {
-        double cells, G, K_I;
-    };
-    for (const auto& [cells, G, K_I] : {Reached{10, 0.19, 0.065}, {20, 0.09, 0.03}}) {
+    for (const double cells : {10.0, 20.0}) {
         SlantedCrack plate;
         plate.cells = cells;
         plate.remote(1, 1) = remote_stress;
@@ -243,8 +239,8 @@ TEST(HardPoisson, CentreCrackAtNearlyHalf) {
         const double K = remote_stress * std::sqrt(std::numbers::pi * plate.half_length);
         const std::string name = fmt::format("nu = 0.499, {:.0f} cells per half crack", cells);
         hard_case(name, "exact G of a Griffith crack", load.G / griffith_rate(plate.half_length, 40e6 / (1 - 0.499 * 0.499)) - 1,
-                  0.02, G);
-        hard_case(name, "exact K_I", load.K_I / K - 1, 0.02, K_I);
+                  0.02);
+        hard_case(name, "exact K_I", load.K_I / K - 1, 0.02);
     }
 }
 

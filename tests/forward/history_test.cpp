@@ -493,9 +493,10 @@ TEST(VerificationHistory, ComesToElasticWood) {
             other.solver.time_step = 0.25;
             const Record record = simulate(other);
             ASSERT_EQ(record.status, RunStatus::finished);
-            // In plane strain cells of plastic wood have one dilatation each, with the error of the grid's that it makes.
-            const bool other_cells = wood.plastic && plane == PlaneCondition::strain;
-            EXPECT_NEAR(record.series.back().force, elastic, (other_cells ? 1e-2 : 1e-6) * elastic);
+            // Cells that remember do not bend as freely as elastic ones; in plane strain those of plastic wood have one dilatation
+            // each. Both make another error of the grid.
+            const bool other_dilatation = wood.plastic && plane == PlaneCondition::strain;
+            EXPECT_NEAR(record.series.back().force, elastic, (other_dilatation ? 1e-2 : 1e-3) * elastic);
             EXPECT_TRUE(std::isnan(record.series.back().G));  // not known in wood that remembers
         }
     }
@@ -520,11 +521,17 @@ TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
             ->displacement;
     };
     const Record elastic = simulate(scene);
+    scene.materials["EW"] = relaxing(1e-9, 1e6);
+    const Record hardly = simulate(scene);
     scene.materials["EW"] = relaxing(0.5, 1e6);
     const Record slow = simulate(scene);
-    EXPECT_NEAR(slow.series.back().crack_length, elastic.series.back().crack_length, 1e-6 * 5e-3);
+    EXPECT_NEAR(slow.series.back().crack_length, hardly.series.back().crack_length, 1e-6 * 5e-3);
+    EXPECT_NEAR(slow.series.back().external_work, hardly.series.back().external_work,
+                1e-6 * hardly.series.back().external_work);
+    // Cells that remember do not bend as freely as elastic ones, with 25 of them along a side.
+    EXPECT_NEAR(slow.series.back().crack_length, elastic.series.back().crack_length, 0.05 * 5e-3);
     EXPECT_NEAR(slow.series.back().external_work, elastic.series.back().external_work,
-                1e-6 * elastic.series.back().external_work);
+                0.005 * elastic.series.back().external_work);
     scene.materials["EW"] = relaxing(0.5, 1e-3);
     const Record relaxed = simulate(scene);
     std::printf("first growth at %.4f mm in elastic wood, %.4f mm in viscoelastic; books off by %.1e\n",
