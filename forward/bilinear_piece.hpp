@@ -35,13 +35,13 @@ class BilinearPiece {
     bool rotates_;
     Eigen::Vector3d strain_;
     Vec2 d_;
-    double u_ = 0, v_ = 0, w_ = 0, trace_ = 1;                // U_xx, U_yy, U_xy per trace, and the trace, of the stretch
-    Eigen::Matrix<double, 3, 4> B_;                           // of strain
-    Eigen::RowVector4d spin_ = Eigen::RowVector4d::Zero();    // of the turn
-    Eigen::Vector3d s_;                                       // slope of the energy by strain
-    Vec2 t_;                                                  // by d
-    double moment_ = 0;                                       // by the turn, which takes left_of(d) from d
-    Eigen::Vector4d p_;                                       // by R^T dF
+    double u_ = 0, v_ = 0, w_ = 0, trace_ = 1;              // U_xx, U_yy, U_xy per trace, and the trace, of the stretch
+    Eigen::Matrix<double, 3, 4> B_;                         // of strain
+    Eigen::RowVector4d spin_ = Eigen::RowVector4d::Zero();  // of the turn
+    Eigen::Vector3d s_;                                     // slope of the energy by strain
+    Vec2 t_;                                                // by d
+    double moment_ = 0;                                     // by the turn, which takes left_of(d) from d
+    Eigen::Vector4d p_;                                     // by R^T dF
     Mat2 turn_ = Mat2::Identity();
     std::array<Vec2, 4> slope_;  // of the corners' shape functions [1/m]
 };

@@ -110,9 +110,7 @@ Eigen::Matrix3d LayeredElasticity::stiffness() const {
     return from_axes(across, normal);
 }
 
-Vec2 uniaxial_moduli(const Eigen::Matrix3d& stiffness) {
-    return stiffness.inverse().diagonal().head<2>().cwiseInverse();
-}
+Vec2 uniaxial_moduli(const Eigen::Matrix3d& stiffness) { return stiffness.inverse().diagonal().head<2>().cwiseInverse(); }
 
 double rayleigh_speed(const Eigen::Matrix3d& stiffness, double density) {
     const double c11 = stiffness(0, 0), c22 = stiffness(1, 1), c12 = stiffness(0, 1), c66 = stiffness(2, 2);

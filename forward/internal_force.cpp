@@ -96,7 +96,8 @@ double InternalForce::visit_whole_cells(std::span<const int> cells, const Wood& 
     for (const int c : cells) {
         if (!wood.has(c)) continue;
         const auto node = points.node[points.first_of_cell[c]];
-        const Vec2 &u0 = displacement[node[0]], &u1 = displacement[node[1]], &u2 = displacement[node[2]], &u3 = displacement[node[3]];
+        const Vec2 &u0 = displacement[node[0]], &u1 = displacement[node[1]], &u2 = displacement[node[2]],
+                   &u3 = displacement[node[3]];
         const Vec2 rising = u3 - u0, falling = u1 - u2;
         const Vec2 by_x = half_slope.x() * (rising + falling), by_y = half_slope.y() * (rising - falling);  // du_i / dX_j
         Vec2 d = u0 - u1 - u2 + u3;

@@ -13,12 +13,12 @@ namespace crampfit {
 /// Adds the internal forces of all points to `force` (one entry a field): f_k -= V P grad N_k, with the stress P from the
 /// displacements, and those of uneven cells. Cells next to a crack or a cutout are taken point by point, with B-splines all.
 ///
-/// Cells that hold all their points on common fields are taken as a whole (`BilinearPiece`): the strain in a cell's middle, and q =
-/// (u_0 - u_1 - u_2 + u_3) / (h_x h_y) by which the displacement gradient changes from there, (y - y_m) q in x and (x - x_m) q in
-/// y. Corners that move so bend the cell, which a bilinear displacement does not allow without shear, nor nearly incompressible
-/// wood at all. With its sides free to curve (incompatible modes of Wilson, Taylor, Doherty and Ghaboussi 1973; in rectangles the
-/// modes that Taylor, Beresford and Wilson 1976 give any quadrilateral are the same) what is left of the energy of q is that of
-/// stress along x and y alone,
+/// Cells that hold all their points on common fields are taken as a whole (`BilinearPiece`): the strain in a cell's middle, and q
+/// = (u_0 - u_1 - u_2 + u_3) / (h_x h_y) by which the displacement gradient changes from there, (y - y_m) q in x and (x - x_m) q
+/// in y. Corners that move so bend the cell, which a bilinear displacement does not allow without shear, nor nearly
+/// incompressible wood at all. With its sides free to curve (incompatible modes of Wilson, Taylor, Doherty and Ghaboussi 1973; in
+/// rectangles the modes that Taylor, Beresford and Wilson 1976 give any quadrilateral are the same) what is left of the energy of
+/// q is that of stress along x and y alone,
 ///     V/2 [h_y^2 / 12 E_x q_x^2 + h_x^2 / 12 E_y q_y^2],
 /// E_x and E_y as in `uniaxial_moduli`: the curvatures of the sides that minimise the energy drop out in closed form.
 ///

@@ -60,7 +60,8 @@ void MaterialSlope::look_at_cells(std::vector<MaterialSlope>& numbers, const Dis
             const LocalWood less = number.less_.average(area), more = number.more_.average(area);
             const Eigen::Matrix3d of_less = less.elasticity.stiffness(), of_more = more.elasticity.stiffness();
             number.stiffness_[c] = (of_more - of_less) / (2.0 * number.step_);
-            if (of_more != of_less) number.moduli_[c] = (uniaxial_moduli(of_more) - uniaxial_moduli(of_less)) / (2.0 * number.step_);
+            if (of_more != of_less)
+                number.moduli_[c] = (uniaxial_moduli(of_more) - uniaxial_moduli(of_less)) / (2.0 * number.step_);
             if (!more.mixed || !body.cell_is_full(c) || body.layout.degree > 1) continue;
             number.uneven_of_cell_[c] = static_cast<int>(number.uneven_.size());
             number.uneven_.push_back(

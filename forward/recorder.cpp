@@ -31,7 +31,8 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
             }
             for (int p = group.first; p < group.first + group.count; ++p) {
                 const Mat2 stress =
-                    elastic_state(seen_gradient_at(body, p, displacement, plan.rotates), points.stiffness_of(p), plan.rotates).stress;
+                    elastic_state(seen_gradient_at(body, p, displacement, plan.rotates), points.stiffness_of(p), plan.rotates)
+                        .stress;
                 const double xx = stress(0, 0), yy = stress(1, 1), xy = 0.5 * (stress(0, 1) + stress(1, 0));
                 double zz = 0.0;
                 if (plane_strain)

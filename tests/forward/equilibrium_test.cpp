@@ -551,8 +551,8 @@ TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
 }
 
 TEST(VerificationEquilibrium, IsWhereDampedMotionComesToRest) {
-    // The one discretisation by two solvers; motion has died out to 1e-5 when the explicit run ends. The tip has gone a quarter of its
-    // way past the nodes beside it: ties of less are stiffer than a time step affords, and begin with slack (`TipTies`).
+    // The one discretisation by two solvers; motion has died out to 1e-5 when the explicit run ends. The tip has gone a quarter
+    // of its way past the nodes beside it: ties of less are stiffer than a time step affords, and begin with slack (`TipTies`).
     const Scene scene = ring_specimen(3.02e-3, 0.5e-3);
     Trial moved(scene);
     moved.until(*scene.stop.time);

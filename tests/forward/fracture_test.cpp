@@ -176,8 +176,8 @@ double energy_of_edge_crack(double cell, double nu, const Vec2& tip, double* rat
 }
 
 TEST(VerificationEnergy, TheCrackOfAGridIsAsLongAsDrawn) {
-    // Of the energy's error the part that goes with the first power of the cell is G times how much longer the grid's crack is. The
-    // energy of a perfect grid is that of two finer ones with that part taken off.
+    // Of the energy's error the part that goes with the first power of the cell is G times how much longer the grid's crack is.
+    // The energy of a perfect grid is that of two finer ones with that part taken off.
     constexpr double h = 0.5e-3;
     for (const double nu : {0.0, 0.33, 0.45})
         for (const double lift : {0.0, 0.5}) {
@@ -190,8 +190,8 @@ TEST(VerificationEnergy, TheCrackOfAGridIsAsLongAsDrawn) {
                 longest = std::max(longest, longer);
                 shortest = std::min(shortest, longer);
             }
-            std::printf("nu = %.2f, crack %.1f cells above a line of the grid: %+.3f to %+.3f cells longer than drawn\n", nu, lift,
-                        shortest, longest);
+            std::printf("nu = %.2f, crack %.1f cells above a line of the grid: %+.3f to %+.3f cells longer than drawn\n", nu,
+                        lift, shortest, longest);
             // One twentieth of a cell is 0.5 % of the length of a crack of ten cells.
             EXPECT_LT(std::max(longest, -shortest), 0.05) << nu << " " << lift;
         }

@@ -493,8 +493,8 @@ TEST(VerificationHistory, ComesToElasticWood) {
             other.solver.time_step = 0.25;
             const Record record = simulate(other);
             ASSERT_EQ(record.status, RunStatus::finished);
-            // Cells that remember do not bend as freely as elastic ones; in plane strain those of plastic wood have one dilatation
-            // each. Both make another error of the grid.
+            // Cells that remember do not bend as freely as elastic ones; in plane strain those of plastic wood have one
+            // dilatation each. Both make another error of the grid.
             const bool other_dilatation = wood.plastic && plane == PlaneCondition::strain;
             EXPECT_NEAR(record.series.back().force, elastic, (other_dilatation ? 1e-2 : 1e-3) * elastic);
             EXPECT_TRUE(std::isnan(record.series.back().G));  // not known in wood that remembers
@@ -526,8 +526,7 @@ TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
     scene.materials["EW"] = relaxing(0.5, 1e6);
     const Record slow = simulate(scene);
     EXPECT_NEAR(slow.series.back().crack_length, hardly.series.back().crack_length, 1e-6 * 5e-3);
-    EXPECT_NEAR(slow.series.back().external_work, hardly.series.back().external_work,
-                1e-6 * hardly.series.back().external_work);
+    EXPECT_NEAR(slow.series.back().external_work, hardly.series.back().external_work, 1e-6 * hardly.series.back().external_work);
     // Cells that remember do not bend as freely as elastic ones, with 25 of them along a side.
     EXPECT_NEAR(slow.series.back().crack_length, elastic.series.back().crack_length, 0.05 * 5e-3);
     EXPECT_NEAR(slow.series.back().external_work, elastic.series.back().external_work,

@@ -102,9 +102,7 @@ TEST(VerificationRings, ReactionAndEnergyReleaseRate) {
     check_rates(0.1e-3, {0.01, 0.025}, {0.01, 0.018});  // asked: 0.01 of all; two rows miss it
 }
 
-TEST(SlowVerificationRings, ReactionAndEnergyReleaseRateOnAFinerGrid) {
-    check_rates(0.05e-3, {0.01, 0.01}, {0.01, 0.01});
-}
+TEST(SlowVerificationRings, ReactionAndEnergyReleaseRateOnAFinerGrid) { check_rates(0.05e-3, {0.01, 0.01}, {0.01, 0.01}); }
 
 }  // namespace
 }  // namespace crampfit::test
