@@ -2,16 +2,13 @@
 
 #include <Eigen/LU>
 
-#include <algorithm>
-
 namespace crampfit {
 
 Mat2 seen_gradient_at(const Discretisation& body, int p, const std::vector<Vec2>& displacement, bool rotates) {
     const Mat2 at_point = gradient_at(body, p, displacement);
     const int c = body.points.cell[p];
     const Layout& layout = body.layout;
-    const bool is_uneven = std::ranges::binary_search(body.uneven_cells, c, {}, &Discretisation::UnevenCell::cell);
-    if (layout.degree > 1 || is_uneven || !body.cell_is_whole(c)) return at_point;
+    if (layout.degree > 1 || !body.cell_is_whole(c)) return at_point;
     const auto node = body.points.node[p];
     const Vec2 arm = body.points.position[p] - layout.cell_corner(c) - 0.5 * layout.cell;  // from the cell's middle
     Vec2 q = Vec2::Zero();

@@ -166,8 +166,7 @@ inline Mat2 gradient_at(const Discretisation& body, int p, const std::vector<Vec
 
 /// Gradient at a point of the displacement as its energy knows it. A cell whose points are all on the same fields bends as wood
 /// does: what its strain changes by across it, q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), puts stress along x and y on it alone
-/// (`InternalForce`), so that its sides curve by as much as that takes. In cells of several woods, where the average says little
-/// of it, it is that of the point alone: K of a crack in rings is steadier by it.
+/// (`InternalForce`), so that its sides curve by as much as that takes.
 Mat2 seen_gradient_at(const Discretisation& body, int p, const std::vector<Vec2>& displacement, bool rotates);
 
 inline Vec2 value_at(const Discretisation& body, int p, const std::vector<Vec2>& field) {
