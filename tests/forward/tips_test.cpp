@@ -176,6 +176,30 @@ TEST(UnitGrowthDirection, CountsFromTheCrackAhead) {
     }
 }
 
+// A tip in stiff or soft wood that heeds K only so far from a boundary across its way, not along it; K_I = K_II ask for 53 degrees.
+TEST(UnitGrowthDirection, BoundariesAreCrossedStraight) {
+    Scene scene = block({10e-3, 10e-3}, 1e-3);
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{Vec2(5e-3 - 100.0, 5e-3), 200.0, 0.5, 0.0};  // boundary at x = 5 mm
+    TipLoad load;
+    load.K_I = load.K_II = 1.0;
+    for (const double ratio : {1.5, 10.0}) {
+        scene.materials["LW"] = {ratio * 40e6, 0.33, 400.0, earlywood().toughness};
+        const MaterialMap materials(scene);
+        for (const Vec2& ahead : {Vec2(1, 0), Vec2(0, 1)}) {
+            for (const double x : {4.4e-3, 4.6e-3, 5.4e-3, 5.6e-3}) {
+                CrackTip tip;
+                tip.position = {x, 5e-3};
+                tip.direction = ahead;
+                const Vec2 way = growth_direction(GrowthDirection::hoop_stress, tip, load, materials, 0.5e-3);
+                const bool crosses = ratio > 2.0 && ahead.x() > 0.0 && std::abs(x - 5e-3) < 0.5e-3;
+                EXPECT_NEAR(std::atan2(cross(ahead, way), ahead.dot(way)) / degree, crosses ? 0.0 : -53.13, 0.01)
+                    << ratio << ", " << x << ", " << ahead.transpose();
+            }
+        }
+    }
+}
+
 TEST(UnitGrowthDirection, RoundingTurnsNoCrack) {
     const MaterialMap materials(block({10e-3, 10e-3}, 1e-3));
     CrackTip tip;
