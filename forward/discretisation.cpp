@@ -292,6 +292,11 @@ bool Discretisation::cell_is_whole(int c) const {
     return true;
 }
 
+const Unevenness* Discretisation::unevenness_of_whole(int c) const {
+    const auto found = std::ranges::lower_bound(uneven_cells, c, {}, &UnevenCell::cell);
+    return found != uneven_cells.end() && found->cell == c && cell_is_whole(c) ? &found->wood : nullptr;
+}
+
 int Discretisation::point_at(const Vec2& x) const {
     const Vec2 place = x.cwiseQuotient(layout.point_size());
     const int columns = layout.cells_x * layout.per_side;

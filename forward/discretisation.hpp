@@ -166,6 +166,7 @@ class Discretisation {
     std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     bool cell_is_whole(int c) const;                             // full, and no crack between its points
+    const Unevenness* unevenness_of_whole(int c) const;          // null where a cell is cut, or of one wood
     int point_at(const Vec2& x) const;                           // the point whose domain holds x, or -1
     WoodArea area_of_cell(int c) const { return {layout.cell_corner(c) + 0.5 * layout.cell, 0.5 * layout.cell}; }
     LocalWood wood_of_cell(const MaterialMap& materials, int c) const;                                       // on average

@@ -301,10 +301,23 @@ struct Seen {
     }
 };
 
+// What a point's stress is more than that of its cell's mean wood: in a whole cell of several woods q pulls on the stiffer ones
+// more on one side than on the other (`Unevenness`) [Pa].
+Mat2 stress_of_unevenness(const Discretisation& body, int p, const std::vector<Vec2>& displacement, const Mat2& turn) {
+    const Unevenness* uneven = body.unevenness_of_whole(body.points.cell[p]);
+    if (!uneven) return Mat2::Zero();
+    const auto node = body.points.node[p];
+    Vec2 q = Vec2::Zero();
+    for (int k = 0; k < 4; ++k) q += crosswise_sign[k] / body.layout.cell.prod() * displacement[node[k]];
+    const Eigen::Vector3d s = uneven->coupling * (turn.transpose() * q);
+    return turn * (Mat2() << s[0], s[2], s[2], s[1]).finished();
+}
+
 // From the frame that has turned with the wood around the tip.
 Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const Mat2& turn, bool rotates) {
     const Mat2 gradient = seen_gradient_at(body, p, nodal.displacement, rotates);
-    const PointState state = elastic_state(gradient, body.points.stiffness_of(p), rotates);
+    PointState state = elastic_state(gradient, body.points.stiffness_of(p), rotates);
+    state.stress += stress_of_unevenness(body, p, nodal.displacement, turn);
     Seen seen;
     seen.strain = state.strain;
     seen.inertia = body.points.density(p) * value_at(body, p, nodal.acceleration);
