@@ -170,13 +170,17 @@ double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& n
     const Vec2 tip = cracks_.lines[crack].tip(at_end).position;
     const auto stiffness = points.stiffness;
     const auto layers = points.layers;
+    const auto uneven_cells = body_.uneven_cells;
     const auto with_wood_of = [&](const MaterialMap& materials, double step) {
         body_.for_cells_near(tip, reach * body_.layout.cell.maxCoeff(), [&](int c) {
-            const LocalWood wood = body_.wood_of_cell(materials, c);
+            WoodArea area = body_.area_of_cell(c);
+            const LocalWood wood = materials.average(area);
             const Eigen::Matrix3d C = wood.elasticity.stiffness();
             points.stiffness[c] = {C(0, 0), C(0, 1), C(1, 1), C(2, 2), C(0, 2), C(1, 2)};
             for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1] && !layers.empty(); ++p)
                 points.layers[p] = wood.elasticity.coefficients.head<4>();
+            const auto cell = std::ranges::lower_bound(body_.uneven_cells, c, {}, &Discretisation::UnevenCell::cell);
+            if (cell != body_.uneven_cells.end() && cell->cell == c) cell->wood = body_.unevenness_of(materials, area, wood);
         });
         std::vector<Vec2> displacement = displacement_;
         for (std::size_t f = 0; f < displacement.size(); ++f) displacement[f] += step * displacement_slope[f];
@@ -186,6 +190,7 @@ double Equilibrium::release_slope(int crack, bool at_end, const MaterialSlope& n
     const double less = with_wood_of(number.materials(false), -number.step());
     points.stiffness = stiffness;
     points.layers = layers;
+    std::ranges::copy(uneven_cells, body_.uneven_cells.begin());
     return (more - less) / (2.0 * number.step());
 }
 

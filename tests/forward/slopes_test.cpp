@@ -126,6 +126,7 @@ TEST(GradientRecord, WhereTheTipsOwnGSaysWhenItMoves) {
         Scene scene = across_rings(transition > 0.0 ? 0.4e-3 : 0.5e-3);
         scene.cracks[0].advance = 0.0;
         scene.specimen.rings->transition = transition;
+        scene.output.samples = 97;  // no corner of the curve passes a row within the step
         // The crack runs through latewood without more load: its toughness changes nothing.
         check(transition > 0.0 ? "advance 0" : "advance 0, sharp boundaries", scene, 1e-4, 1e-5, {"materials.EW.toughness"});
     }
