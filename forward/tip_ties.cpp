@@ -52,7 +52,8 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
             tie = {.waits = !at_rest,
                    .from = at_rest ? 0.0 : std::max(0.0, pair.freed),
                    .softness = k >= known ? softness : tie.softness,
-                   .begun_at = jump};
+                   .begun_at = jump,
+                   .from_rest = at_rest};
             tie.pulled_at = share(tie, pair.freed);
         }
         if (pair.freed >= 1.0 || left == 0.0 || right == 0.0 || !std::isfinite(pair.compliance)) continue;
@@ -145,8 +146,8 @@ double TipTies::taken_on(const CrackFields& cracks, int crack, bool at_end, doub
         const Vec2 before = here - motion.since * rate, next = here + motion.until * rate;
         const double from = share(tie, pair.freed);
         const double to = share(tie, pair.freed + way / width_here);
-        sum += 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, next.dot(before));
-        sum -= (to - from) * tie.held;
+        const double given = 0.5 * (stiffness(tie, from) - stiffness(tie, to)) * std::max(0.0, next.dot(before));
+        sum += tie.from_rest ? (1.0 + tie.slack) * given : given - (to - from) * tie.held;
     }
     return sum;
 }

@@ -200,7 +200,7 @@ void check_growing(double cell, double lift, std::initializer_list<double> stres
 TEST(VerificationBridging, GrowsAtTheEnergyOfTipAndBridges) { check_growing(0.2e-3, 0.0, {1e6, 1.5e6}, 0.06); }
 
 TEST(SlowVerificationBridging, GrowsAtTheEnergyOfTipAndBridges) {
-    check_growing(0.1e-3, 0.0, {1e6, 2e6}, 0.045);  // without bridges it is 7 % already
+    check_growing(0.1e-3, 0.0, {1e6, 2e6}, 0.042);  // without bridges it is 5 % already, of which 2 are the strip's ends
     check_growing(0.1e-3, 0.5, {1e6, 2e6}, 0.05);
 }
 
