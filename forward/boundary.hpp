@@ -82,12 +82,11 @@ struct Gauges {
 /// Mass of each field [kg]; 0 for fields that no point belongs to.
 std::vector<double> field_masses(const Discretisation& body, int fields);
 
-/// How stiff the tie of a pair is [N/m]. A crack between two rows of nodes has a pair on either: they share the tie as they share
-/// the mass beyond the crack.
+/// How stiff the tie of a pair is [N/m].
 inline double shared_tie(const FieldPair& pair, const std::vector<double>& mass) {
     const double left = mass[pair.left];
     const double right = mass[pair.right];
-    return left > 0.0 && right > 0.0 ? 4.0 * left * right / ((left + right) * (left + right)) * pair.tie : 0.0;
+    return left > 0.0 && right > 0.0 ? tie_share(left, right) * pair.tie : 0.0;
 }
 
 }  // namespace crampfit

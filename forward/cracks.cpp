@@ -17,6 +17,10 @@ namespace {
 // which is stiffer than that field, has 4.1 to 4.3 at nu = 0 to 0.33 and 3.7 at 0.45 (`UnitTies.EnergyGoesLinearlyWithTheTip`).
 constexpr double pair_compliance = 4.2;
 
+// Half way between two rows the masses alone, 1 : 7 on either side, would leave both pairs together 0.875 of the tie: 7 % less than
+// what lets the energy go evenly with the tip (`UnitTies`).
+constexpr double sharing_exponent = 0.92;
+
 // A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip
 // field, so that the crack of a grid ends behind the tip. Hats: from how the energy of a plate with an edge crack under mode I
 // converges, which is where the error of the first power of the cell is this shift alone: with the tip anywhere in a cell and the
@@ -103,6 +107,10 @@ double share_freed(const Vec2& node, const CrackTip& tip, const Layout& layout) 
 }
 
 double way_past_a_node(const Vec2& direction, const Vec2& cell) { return Passing(direction, cell).way; }
+
+double tie_share(double left, double right) {
+    return std::pow(4.0 * left * right / ((left + right) * (left + right)), sharing_exponent);
+}
 
 double tie_stiffness(double freed, double stiffness) { return (1.0 - freed) / freed * stiffness / pair_compliance; }
 

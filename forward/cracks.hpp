@@ -67,6 +67,10 @@ double way_past_a_node(const Vec2& direction, const Vec2& cell);
 /// than the wood: with less, it would spoil the condition of the stiffness; with more, the energy would go in steps.
 inline constexpr double least_freed_at_rest = 0.02;
 
+/// The part of a tie that a pair of fields with these masses on its left and right takes. A crack between two rows of nodes has a
+/// pair on either: they share the tie as they share the mass beyond the crack.
+double tie_share(double left, double right);
+
 /// What still holds the pair of fields at a node together when so much of it is freed [N/m]; `stiffness`: E' of the wood times
 /// the thickness [N/m].
 double tie_stiffness(double freed, double stiffness);

@@ -108,7 +108,7 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
             const double left = mass[pair.left], right = mass[pair.right];
             asked.push_back(&pair);
             freed_.push_back(freed);
-            compliance_.push_back(pair.compliance * (left + right) * (left + right) / (4.0 * left * right));
+            compliance_.push_back(pair.compliance / tie_share(left, right));
             continue;
         }
         if (pair.freed >= 1.0) continue;

@@ -58,9 +58,7 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
         }
         if (pair.freed >= 1.0 || left == 0.0 || right == 0.0 || !std::isfinite(pair.compliance)) continue;
         live_.push_back(k);
-        // A crack between two rows of nodes has a pair on either: they share the tie as they share the mass beyond the crack.
-        const double shared = 4.0 * left * right / ((left + right) * (left + right));
-        const double compliance = tie.softness * pair.compliance / shared;
+        const double compliance = tie.softness * pair.compliance / tie_share(left, right);
         const double most = most_frequency_squared_ * left * right / (left + right);
         const double f = share(tie, pair.freed);
         const double slack = std::max(tie.slack, (1.0 - f) / (most * compliance) - f);

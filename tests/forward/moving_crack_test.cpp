@@ -162,9 +162,8 @@ double time_at(const Record& record, double crack_length) {
     return std::nan("");
 }
 
-// The first tenth of a cell of a crack in a slowly pulled strip, wherever in a cell its tip stood: the ties of a start have yielded
-// to the rising load, and what that gave up must not be asked for again (3 to 5 % more, `TipTies`). Half way between two lines of
-// the grid pairs are less soft than `pair_compliance` says.
+// The first tenth of a cell of a crack in a slowly pulled strip, wherever in a cell its tip stood: the ties of a start have
+// yielded to the rising load, and what that gave up must not be asked for again (3 to 5 % more, `TipTies`).
 TEST(VerificationMovingCrack, BeginsToMoveAtItsToughness) {
     const double h = 0.1e-3;
     for (const double lift : {0.0, 0.5}) {
@@ -182,7 +181,7 @@ TEST(VerificationMovingCrack, BeginsToMoveAtItsToughness) {
             scene.stop.crack_length = tip.x() + 0.1 * h;
             const double J = simulate(scene).series.back().G;
             std::printf("tip %.1f of a cell along, %.1f up: begins to move at J = %.1f of 100 J/m^2\n", place, lift, J);
-            EXPECT_NEAR(J, earlywood().toughness, (lift > 0.0 ? 0.07 : 0.02) * earlywood().toughness);
+            EXPECT_NEAR(J, earlywood().toughness, 0.02 * earlywood().toughness);
         }
     }
 }
