@@ -62,7 +62,7 @@ displacement = "pulled"
 kind = "quasistatic"
 
 [stop]
-displacement = "1.5 mm"
+displacement = "4 mm"
 )",
                        cell, cut.pulled, cut.velocity, cut.held, cut.notch);
 }
@@ -78,7 +78,8 @@ double apart(const Vec2& x, const std::vector<Vec2>& way) {
 }
 
 // Each crack goes through, and cells half as wide show the same way to one and a half of the coarse cells, but for the last three
-// of these before it goes out, where the domain in which K steers it does not fit.
+// of these before it goes out, where the domain in which K steers it does not fit. Up to 4 mm turns of the wood count: by small
+// strain RT with cells of 0.1 mm may end beside latewood half a millimetre before the edge.
 TEST(SlowDisk, ScenesCutFromItSplit) {
     const auto image = std::filesystem::path(SHARED_DATA) / "wood" / "urudendro_f02c_crop.png";
     if (!std::filesystem::exists(image))
