@@ -17,8 +17,8 @@ namespace {
 // which is stiffer than that field, has 4.1 to 4.3 at nu = 0 to 0.33 and 3.7 at 0.45 (`UnitTies.EnergyGoesLinearlyWithTheTip`).
 constexpr double pair_compliance = 4.2;
 
-// Half way between two rows the masses alone, 1 : 7 on either side, would leave both pairs together 0.875 of the tie: 7 % less than
-// what lets the energy go evenly with the tip (`UnitTies`).
+// Half way between two rows the masses alone, 1 : 7 on either side, would leave both pairs together 0.875 of the tie: 7 % less
+// than what lets the energy go evenly with the tip (`UnitTies`).
 constexpr double sharing_exponent = 0.92;
 
 // A pair is half free when the tip has passed its node by this part of a cell: the cells at the tip are stiffer than the near-tip

@@ -19,9 +19,9 @@ namespace crampfit {
 /// Papoulia, Sam and Vavasis 2003 ask). Its energy, with what the slack held at the start taken off,
 ///     W = (1 - f) / 2 [ |jump + s c F0|^2 / ((f + s) c) - s c F0^2 ],
 /// is the only thing in a running specimen that depends on where the tip is, so that - dW/da is the energy release rate, exactly.
-/// A tie that stands from the start of a run, with F0 = 0, yields by its slack while the load rises, which gives up s / (1 + s) of
-/// that energy before the tip moves: as what the tip takes up that part counts too. (Of a tie that was loaded before, a load that
-/// rises while the tip stands gives up nothing to first order.)
+/// A tie that stands from the start of a run, with F0 = 0, yields by its slack while the load rises, which gives up s / (1 + s)
+/// of that energy before the tip moves: as what the tip takes up that part counts too. (Of a tie that was loaded before, a load
+/// that rises while the tip stands gives up nothing to first order.)
 class TipTies {
   public:
     /// A tie may add as much to the squared frequency of its pair [1/s^2].
