@@ -85,9 +85,9 @@ bool crosses_other_wood(const CrackTip& tip, const MaterialMap& materials, doubl
     if (materials.homogeneous()) return false;
     const double here = materials.at(tip.position).plane_modulus();
     for (int i = -samples; i <= samples; ++i) {
-        const LocalWood there = materials.at(tip.position + reach * i / samples * tip.direction);
-        const double modulus = there.plane_modulus();
-        if (modulus > most * here || most * modulus < here) return true;
+        const double modulus = materials.at(tip.position + reach * i / samples * tip.direction).plane_modulus();
+        const bool is_wood = modulus > 0.0 && here > 0.0;  // a void is no other wood
+        if (is_wood && (modulus > most * here || most * modulus < here)) return true;
     }
     return false;
 }

@@ -71,6 +71,7 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
             tie.held *= before.compliance / compliance;
             continue;
         }
+        tie.from_rest = false;
         // It goes on with the same force and energy; of a tip that has turned back, no harder than it did.
         const double at = std::max(f, tie.pulled_at);
         const Vec2 force = stiffness(before, at) * (jump + before.stretch);
