@@ -141,6 +141,66 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
 }
 
 // What slides must not lie in the wood at the start; what it touches may be off by what the points of cut cells are.
+// Which sides of a crack, right and left, have points within a cell of it.
+std::array<bool, 2> sides_with_points(const Discretisation& body, const Crack& crack) {
+    const double cell = body.layout.cell.maxCoeff();
+    std::array<bool, 2> found{false, false};
+    for (std::size_t k = 0; k + 1 < crack.points.size(); ++k) {
+        const Vec2 from = crack.points[k], to = crack.points[k + 1];
+        body.for_cells_in({from.cwiseMin(to).array() - cell, from.cwiseMax(to).array() + cell}, [&](int c) {
+            for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
+                const Vec2& x = body.points.position[p];
+                const double along = nearest_on_segment(from, to, x);
+                const Vec2 away = x - (from + along * (to - from));
+                if (along > 0.0 && along < 1.0 && away.norm() < cell) found[cross(to - from, away) > 0.0] = true;
+            }
+        });
+    }
+    return found;
+}
+
+bool is_seen(const Discretisation& body, const Crack& crack) {
+    const auto [right, left] = sides_with_points(body, crack);
+    return right && left;
+}
+
+// Asked of those alone that come that close to the outline on all of their way.
+bool wide_cells_see_cracks(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
+    const double cell = 2.0 * body.layout.cell.maxCoeff();
+    const Vec2 size = body.layout.size();
+    const auto is_far_in = [&](const Vec2& x) { return x.minCoeff() > cell && (size - x).minCoeff() > cell; };
+    std::optional<Discretisation> wide;
+    return std::all_of(scene.cracks.begin(), scene.cracks.end(), [&](const Crack& crack) {
+        if (std::any_of(crack.points.begin(), crack.points.end(), is_far_in)) return true;
+        if (!wide) wide.emplace(scene, materials, Layout::of(scene, 2.0 * body.layout.cell));
+        return is_seen(*wide, crack);
+    });
+}
+
+void check_cracks(const Scene& scene, const Discretisation& body) {
+    const Vec2 size = body.layout.size(), hair = 1e-9 * size;
+    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
+        const Crack& crack = scene.cracks[k];
+        const std::string key = fmt::format("cracks.{}", k);
+        const auto is_within = [&](const Vec2& x) {
+            return (x.array() > hair.array()).all() && (x.array() < (size - hair).array()).all();
+        };
+        const bool start = crack.grows == Growth::start || crack.grows == Growth::both;
+        const bool end = crack.grows == Growth::end || crack.grows == Growth::both;
+        if ((start || end) && !(start && is_within(crack.points.front())) && !(end && is_within(crack.points.back())))
+            refuse(scene, key + ".grows",
+                   start && end ? "both"
+                   : start      ? "start"
+                                : "end",
+                   "no such end of the crack lies inside the specimen: there is no wood to grow into");
+        const auto [right, left] = sides_with_points(body, crack);
+        if (right != left)
+            refuse(scene, key + ".points", fmt::format("on cells of {:.3g} mm", 1e3 * body.layout.cell.maxCoeff()),
+                   fmt::format("the grid has no wood {} of the crack: it must lie farther in, or the cells be smaller",
+                               right ? "left" : "right"));
+    }
+}
+
 void check_bodies(const Scene& scene, const Discretisation& body) {
     const double hair = 0.05 * body.layout.cell.minCoeff();
     for (const Body& rigid : scene.bodies) {
@@ -292,6 +352,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                         !bridged && (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     check_bodies(scene, body);
+    check_cracks(scene, body);
     if (!may_end(scene))
         refuse(scene, "stop",
                scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
@@ -343,13 +404,15 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                              least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
     const bool may_meet = plan.grows && scene.cracks.size() > 1;
     const bool may_extrapolate = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
-    plan.extrapolates = may_extrapolate && resolves_woods(body);
+    const bool resolved = may_extrapolate && resolves_woods(body);
+    plan.extrapolates = resolved && wide_cells_see_cracks(scene, materials, body);
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
                : plan.remembers  ? "wood that remembers: errors of time and of the grid do not go together"
                : may_meet
                    ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
+               : resolved        ? "a second, twice as coarse, would have no wood beside a crack"
                : may_extrapolate ? "layers of the stiffest wood are less than two cells of a second, twice as coarse, wide: its "
                                    "error would not tell"
                : scene.solver.extrapolate

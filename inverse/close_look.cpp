@@ -24,6 +24,7 @@ constexpr int points_a_parameter = 12;  // of a spread
 constexpr int most_profiles = 8;        // in windows of rising width
 constexpr double rounding = 1e-9;       // of the box
 constexpr double as_good = 0.02;        // of the misfit, in what the noise explains: a seventh of a standard error
+constexpr double as_promised = 0.5;     // of a rise of the misfit: as far as a run may be off it
 constexpr int most_descents = 4;        // from lower points that looks come upon
 
 bool all_told(const Uncertainty& u) { return u.untold.empty() && u.model_variance.size() > 0; }
@@ -93,11 +94,65 @@ std::optional<Window> along_valley(const CloseLook& look, const Eigen::VectorXd&
     return agrees ? std::nullopt : std::optional<Window>(std::in_place, x, axes);
 }
 
-// Puts the profile's intervals in the place of those of a parabola. False where one of them does not end in its window.
-bool take_profile(CloseLook& look) {
+// Whether the others would go on beyond the window where a profile is below a height: at an edge that is not the box's.
+bool is_confined(const Profile& profile, const Window& window, double height) {
+    constexpr double at_edge = 1e-3, beyond = 0.05;  // of the window
+    const auto confines = [&](const Eigen::VectorXd& y) {
+        const Eigen::VectorXd here = in_box(window.inside(y));
+        for (Eigen::Index k = 1; k < y.size(); ++k) {
+            Eigen::VectorXd out = y;
+            out[k] += y[k] < at_edge ? -beyond : y[k] > 1 - at_edge ? beyond : 0.0;
+            if ((in_box(window.inside(out)) - here).cwiseAbs().maxCoeff() > rounding) {
+                return true;
+            }
+        }
+        return false;
+    };
+    for (std::size_t i = 0; i < profile.x.size(); ++i) {
+        if (profile.misfit[i] < height && confines(profile.lowest[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Whether a direction goes from bound to bound of the box: no profile that ends within it tells it.
+bool goes_through_box(const Untold& direction, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+    int bounds = 0;
+    for (const Eigen::Index j : direction.parameters) {
+        bounds += (lower[j] < rounding) + (upper[j] > 1.0 - rounding);
+    }
+    return bounds >= 2;
+}
+
+// The first points of a profile, to either side of its lowest one, that come up to a height.
+std::vector<std::size_t> ends_of(const Profile& profile, double height) {
+    const auto lowest =
+        static_cast<std::size_t>(std::min_element(profile.misfit.begin(), profile.misfit.end()) - profile.misfit.begin());
+    std::vector<std::size_t> ends;
+    for (std::size_t i = lowest; i-- > 0;) {
+        if (profile.misfit[i] >= height) {
+            ends.push_back(i);
+            break;
+        }
+    }
+    for (std::size_t i = lowest + 1; i < profile.misfit.size(); ++i) {
+        if (profile.misfit[i] >= height) {
+            ends.push_back(i);
+            break;
+        }
+    }
+    return ends;
+}
+
+enum class Profiled { taken, goes_on, unconfirmed };
+
+// Puts the profile's intervals in the place of those of a parabola, unless one of them goes on beyond its window. Where the
+// parameters cannot be told, `confirm` says whether a misfit at a point of the box is what a run finds there.
+Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::VectorXd&, double misfit, double rise)>& confirm) {
     Uncertainty& u = look.uncertainty;
     if (u.model_variance.size() == 0) {
-        return false;
+        return Profiled::goes_on;
     }
     const bool told = all_told(u);
     double least = look.objective.best()->evaluation->misfit;
@@ -123,17 +178,27 @@ bool take_profile(CloseLook& look) {
             };
             const auto low = end(-1), high = low ? end(1) : std::nullopt;
             if (!high) {
-                return false;
+                return Profiled::goes_on;
             }
             below = *low * scale;
             above = *high * scale;
         } else {
             constexpr double coarse = 0.1;  // of the window: twice the profile's steps
             const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
-            const auto ends = interval(profile, *std::min_element(profile.misfit.begin(), profile.misfit.end()), level);
+            const double lowest = *std::min_element(profile.misfit.begin(), profile.misfit.end());
+            if (is_confined(profile, way.window, lowest + level)) {
+                return Profiled::goes_on;
+            }
+            const auto ends = interval(profile, lowest, level);
             const bool from_bound = way.window.origin[j]<rounding, to_bound = way.window.origin[j] + scale> 1.0 - rounding;
             if ((ends.first <= 0.0 && !from_bound) || (ends.second >= 1.0 && !to_bound)) {
-                return false;
+                return Profiled::goes_on;
+            }
+            for (const std::size_t end : ends_of(profile, lowest + level)) {
+                const Eigen::VectorXd there = in_box(way.window.inside(profile.lowest[end]));
+                if (!confirm(there, profile.misfit[end], profile.misfit[end] - lowest)) {
+                    return Profiled::unconfirmed;
+                }
             }
             below = (way.best.x[0] - ends.first) * scale;
             above = (ends.second - way.best.x[0]) * scale;
@@ -146,13 +211,20 @@ bool take_profile(CloseLook& look) {
     u.lower_95 = told ? Eigen::VectorXd(lower.cwiseMin(u.lower_95)) : lower;
     u.upper_95 = told ? Eigen::VectorXd(upper.cwiseMax(u.upper_95)) : upper;
     if (!told) {
-        u.covariance = ((upper - lower) / (2 * u.quantile)).cwiseAbs2().asDiagonal();
-        u.message.erase(u.message.find(u.untold), u.untold.size());
-        u.untold.clear();
+        // As wide as the intervals, and correlated as before: what stands in for one another does so all the way.
+        const Eigen::VectorXd factor = ((upper - lower) / (2 * u.quantile)).cwiseQuotient(u.covariance.diagonal().cwiseSqrt());
+        u.covariance = factor.asDiagonal() * u.covariance * factor.asDiagonal();
+        std::erase_if(u.untold, [&](const Untold& direction) {
+            if (goes_through_box(direction, lower, upper)) {
+                return false;
+            }
+            u.message.erase(u.message.find(direction.sentence), direction.sentence.size());
+            return true;
+        });
     }
     u.message += told ? "The intervals are the wider of those of the covariance and of the profile likelihood. "
                       : "The intervals are those of the profile likelihood. ";
-    return true;
+    return Profiled::taken;
 }
 
 }  // namespace
@@ -178,8 +250,9 @@ CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
             inverse * uncertainty.covariance * inverse.transpose()};
 }
 
-std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
-                                    const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed) {
+std::optional<CloseLook> look_close(Objective& objective, const Objective::Evaluate& near, bool near_is_exact,
+                                    const Eigen::VectorXd& x, const MeasuredCurves& curves, const std::vector<std::string>& names,
+                                    unsigned seed) {
     // Nothing where the user's stop comes before the first run.
     const auto look = [&](const Window& window) -> std::optional<CloseLook> {
         const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) {
@@ -213,10 +286,25 @@ std::optional<CloseLook> look_close(const Objective& objective, const Objective:
         }
         found = std::move(*here);
     }
+    const auto confirm = [&](const Eigen::VectorXd& there, double misfit, double rise_there) {
+        if (near_is_exact) {
+            return true;
+        }
+        const auto run = objective.at(there);
+        return run && run->usable() && std::abs(run->misfit - misfit) < as_promised * rise_there;
+    };
     auto profiled = std::optional(all_told(found.uncertainty) ? found : *first);
     for (int i = 0; i < most_profiles && profiled && !objective.stopped(); ++i) {
-        if (take_profile(*profiled)) {
+        const Profiled how = take_profile(*profiled, confirm);
+        if (how == Profiled::taken) {
             return profiled;
+        }
+        if (how == Profiled::unconfirmed) {  // anywhere in the box
+            CloseLook anywhere = *first;
+            for (const Untold& u : anywhere.uncertainty.untold) {
+                anywhere.uncertainty.covariance += u.direction * u.direction.transpose() / 12.0;
+            }
+            return anywhere;
         }
         profiled = look(wider(profiled->window, x));
     }

@@ -35,10 +35,12 @@ struct CloseLook {
 /// parameters stand in for one another, as a tough wood for a stiff one, along no axis of the box do differences stay in the
 /// valley and yet go as far as its intervals. The intervals take in those of the profile likelihood, as at the edge of a jump
 /// the misfit is no parabola; where that does not end and differences see no slope, the parameters cannot be told.
+/// Where `near` is not exact in all parameters, runs that the objective makes at their ends confirm such a profile.
 /// `objective` says how many threads there are and when to stop: nothing comes back where that is before the first run;
 /// `curves` and `names` as in `estimate_uncertainty`.
-std::optional<CloseLook> look_close(const Objective& objective, const Objective::Evaluate& near, const Eigen::VectorXd& x,
-                                    const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed);
+std::optional<CloseLook> look_close(Objective& objective, const Objective::Evaluate& near, bool near_is_exact,
+                                    const Eigen::VectorXd& x, const MeasuredCurves& curves, const std::vector<std::string>& names,
+                                    unsigned seed);
 
 /// Whether a run is lower than another by more than what is as good as the same, with what is said `about` the place.
 bool is_lower(const Run& one, const Run& other, const Uncertainty& about);

@@ -204,7 +204,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         std::optional<CloseLook> close;  // where runs near the best one are cheap, as the simulation has derivatives
         std::future<Evaluation> wide;    // there, the best values on cells twice as wide
         const auto estimate = [&] {
-            if (!by_walks) {
+            if (!runs.has_walks()) {
                 return estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));
             }
             const auto look = [&] {
@@ -214,9 +214,16 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 const Eigen::VectorXd x = objective.best()->x;
                 runs.walks().catch_up(runs.values_at(x));
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
-                return look_close(objective, runs.nearby().near(x), x, model.curves(), names, options.seed);
+                const std::vector<bool> exact = runs.walks().exact_near();
+                const bool all_exact = std::all_of(exact.begin(), exact.end(), [](bool one) { return one; });
+                return look_close(objective, runs.nearby().near(x), all_exact, x, model.curves(), names, options.seed);
             };
-            close = look_and_descend(objective, look, [&] { found.converged = runs.descend_again(); });
+            // A method that the study names has had its search; a lower point that a look comes upon is taken as it is.
+            close = look_and_descend(objective, look, [&] {
+                if (by_walks) {
+                    found.converged = runs.descend_again();
+                }
+            });
             return close ? close->uncertainty
                          : estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));
         };
@@ -224,7 +231,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             if (!study.uncertainty.profile && study.uncertainty.posterior == 0) {
                 return Exploration();
             }
-            const bool cheap = own ? only_toughness || by_walks : options.cheap_runs;
+            const bool cheap = own ? runs.has_walks() : options.cheap_runs;
             const auto stations = static_cast<int>(about.best.evaluation->modelled.size());
             return explore(objective, close ? &*close : nullptr, about, study.uncertainty, stations, cheap, options.seed, stage);
         };

@@ -75,6 +75,7 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
             }
             side->x.push_back(held);
             side->misfit.push_back(lowest->evaluation->misfit);
+            side->lowest.push_back(lowest->x);
             if (lowest->evaluation->misfit > best.evaluation->misfit + 1.5 * rise) {
                 break;
             }
@@ -85,10 +86,13 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
     Profile profile;
     profile.x.assign(below.x.rbegin(), below.x.rend());
     profile.misfit.assign(below.misfit.rbegin(), below.misfit.rend());
+    profile.lowest.assign(below.lowest.rbegin(), below.lowest.rend());
     profile.x.push_back(best.x[j]);
     profile.misfit.push_back(best.evaluation->misfit);
+    profile.lowest.push_back(best.x);
     profile.x.insert(profile.x.end(), above.x.begin(), above.x.end());
     profile.misfit.insert(profile.misfit.end(), above.misfit.begin(), above.misfit.end());
+    profile.lowest.insert(profile.lowest.end(), above.lowest.begin(), above.lowest.end());
     return profile;
 }
 

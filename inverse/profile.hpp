@@ -13,8 +13,9 @@ namespace crampfit {
 /// How far the misfit can be lowered by all other parameters while one is held: points of the unit cube by that parameter's
 /// coordinate, rising, the best run's among them.
 struct Profile {
-    std::vector<double> x;       // of the parameter that is held, 0..1
-    std::vector<double> misfit;  // least sum of squares there
+    std::vector<double> x;                // of the parameter that is held, 0..1
+    std::vector<double> misfit;           // least sum of squares there
+    std::vector<Eigen::VectorXd> lowest;  // where that is
 };
 
 /// The profile of parameter j about the best run, outwards in steps of about half a `standard_error` until the misfit has risen

@@ -43,7 +43,8 @@ class StudyRuns {
     std::vector<double> values_at(const Eigen::VectorXd& x) const;
 
     bool only_toughness() const { return only_toughness_; }
-    bool by_walks() const { return by_walks_; }
+    bool has_walks() const { return has_walks_; }  // whether runs near one are cheap
+    bool by_walks() const { return by_walks_; }    // whether the search goes along them
     const KeptWalks& walks() const { return walks_; }
     const Nearby& nearby() const { return nearby_; }
     const StudyModel& model() const { return model_; }
@@ -65,6 +66,7 @@ class StudyRuns {
     int threads_;
     KeptWalks walks_;
     bool only_toughness_;
+    bool has_walks_;
     bool by_walks_;
     bool in_order_;  // the same bits for any number of threads: runs that go on from one another are made one after the other
     StudyModel model_;

@@ -59,29 +59,32 @@ class Undetermined {
     double add(const Eigen::VectorXd& of_window) {
         const Eigen::VectorXd direction = window_.axes * of_window;
         std::vector<std::string> members;
+        std::vector<Eigen::Index> parameters;
         for (std::size_t j = 0; j < names_.size(); ++j) {
             if (std::abs(direction[static_cast<Eigen::Index>(j)]) > 0.1 * direction.cwiseAbs().maxCoeff()) {
                 members.push_back("'" + names_[j] + "'");
+                parameters.push_back(static_cast<Eigen::Index>(j));
                 is_member_[j] = true;
             }
         }
         const std::string sentence = members.size() == 1
                                          ? members.front() + " cannot be told from this data. "
                                          : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
-        if (message_.find(sentence) == std::string::npos) {  // several directions may be made of the same parameters
-            message_ += sentence;
+        const auto is_same = [&](const Untold& other) { return other.sentence == sentence; };
+        if (std::none_of(untold_.begin(), untold_.end(), is_same)) {  // several directions may be made of the same parameters
+            untold_.push_back({parameters, sentence, direction / direction.cwiseAbs().maxCoeff()});
         }
         return direction.cwiseAbs().maxCoeff();
     }
 
     bool contains(Eigen::Index j) const { return is_member_[static_cast<std::size_t>(j)]; }
-    const std::string& message() const { return message_; }
+    const std::vector<Untold>& untold() const { return untold_; }
 
   private:
     const std::vector<std::string>& names_;
     const Window& window_;
     std::vector<bool> is_member_;
-    std::string message_;
+    std::vector<Untold> untold_;
 };
 
 // What data and priors know of the best point in the parameters' units of a window.
@@ -217,8 +220,10 @@ Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& cur
     result.temperature = widening * weights.squaredNorm() / weights.sum();
     result.model_variance = own.diagonal();
     result.slope = directions->slope * window.axes.inverse();
-    result.untold = undetermined.message();
-    result.message += result.untold;
+    result.untold = undetermined.untold();
+    for (const Untold& direction : result.untold) {
+        result.message += direction.sentence;
+    }
     const double share = (own.diagonal().array() / result.covariance.diagonal().array()).maxCoeff();
     if (share > 0.1) {
         result.message += fmt::format("The model's own scatter from run to run, and the best run's distance from the lowest "

@@ -18,6 +18,13 @@ struct MeasuredCurves {
     double root(std::size_t curve) const { return roots.empty() ? 1.0 : roots[curve]; }
 };
 
+/// A direction of which the data say nothing, told by the parameters that it is made of.
+struct Untold {
+    std::vector<Eigen::Index> parameters;
+    std::string sentence;       // for a person
+    Eigen::VectorXd direction;  // [parameters], its largest entry 1
+};
+
 /// How sure the best point is, in the unit cube.
 struct Uncertainty {
     Run best;                    // the run that all of this is about
@@ -29,7 +36,7 @@ struct Uncertainty {
     double widening = 1;                  // s: of variances, for what the noise does not explain
     double temperature = 1;               // T: of the data's likelihood exp(-misfit / 2 T), s and the weights taken in
     double quantile = 2;                  // of Student's distribution, from standard error to interval
-    std::string untold = {};              // which parameters cannot be told (apart), for a person; part of `message` too
+    std::vector<Untold> untold = {};      // their sentences are part of `message` too
     Eigen::MatrixXd slope = {};           // J [residuals x parameters]; empty where it is not known
     Eigen::VectorXd model_variance = {};  // diagonal of V [parameters]; empty where it is not known
     Eigen::VectorXd rise = {};            // of the misfit at the ends of a parameter's interval; empty where it is not known

@@ -190,6 +190,32 @@ TEST(UnitPlan, RefusesWhatItCannotDo) {
         "solver.shape_function");
     refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
     refused([](Scene& s) { s.model.cell = 1e-23; }, "model.cell");
+    const auto crack = [](Scene& s, const Vec2& from, const Vec2& to) {
+        Crack drawn;
+        drawn.points = {from, to};
+        drawn.grows = Growth::end;
+        s.cracks = {drawn};
+    };
+    refused([&](Scene& s) { crack(s, {3e-3, 5e-3}, {0.0, 5e-3}); }, "cracks.0.grows");         // to the side, away from the wood
+    refused([&](Scene& s) { crack(s, {0.0, 0.05e-3}, {3e-3, 0.05e-3}); }, "cracks.0.points");  // no point lies below it
+}
+
+// What wide cells do not see beside a crack, they cannot tell of the grid's error.
+TEST(UnitPlan, ACrackBesideAGripIsForOneGrid) {
+    for (const auto& [height, both] : {std::pair{0.1e-3, false}, std::pair{0.2e-3, true}}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.25e-3));
+        Crack crack;
+        crack.points = {Vec2(0.0, height), Vec2(3e-3, height)};
+        crack.grows = Growth::end;
+        crack.advance = 0.5e-3;
+        scene.cracks = {crack};
+        scene.edges = {moving("top", Side::top, {0.0, 1e-3}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.measure = {"top", "top"};
+        scene.stop.displacement = 1e-3;
+        const MaterialMap materials(scene);
+        const Discretisation body(scene, materials);
+        EXPECT_EQ(make_plan(scene, materials, body).extrapolates, both) << height;
+    }
 }
 
 }  // namespace

@@ -296,8 +296,8 @@ TEST(UnitCloseLook, GivesWhatIsKnownWhenTheUserStops) {
             if (left-- <= 0) stop = true;
             return curved(x);
         };
-        const Objective objective(2, curved, 100, 1, &stop);
-        const auto look = look_close(objective, evaluate, lowest, {{3}}, {"a", "b"}, 1);
+        Objective objective(2, curved, 100, 1, &stop);
+        const auto look = look_close(objective, evaluate, true, lowest, {{3}}, {"a", "b"}, 1);
         if (!look) {
             EXPECT_TRUE(stop) << runs;
             continue;
@@ -329,8 +329,8 @@ TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
             evaluation.misfit = evaluation.residuals.squaredNorm();
             return evaluation;
         };
-        const Objective objective(2, valley, 100, 1);
-        const auto look = look_close(objective, valley, bottom, {{30}}, {"a", "b"}, 1);
+        Objective objective(2, valley, 100, 1);
+        const auto look = look_close(objective, valley, true, bottom, {{30}}, {"a", "b"}, 1);
         ASSERT_TRUE(look);
         const Uncertainty& found = look->uncertainty;
         const auto error_along = [&](const Vector2d& way) { return std::sqrt(0.5 * way.dot(found.covariance * way)); };
@@ -341,6 +341,55 @@ TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
             EXPECT_NEAR(found.lower_95[j], std::max(0.0, bottom[j] - half), 0.05 * half);
             EXPECT_NEAR(found.upper_95[j], bottom[j] + half, 0.05 * half);
         }
+    }
+}
+
+// Noise, and what hangs on one combination of the parameters alone.
+Evaluation ridge(double across) {
+    Evaluation evaluation;
+    evaluation.residuals = VectorXd::Ones(30);
+    for (Eigen::Index i = 0; i < 30; i += 2) {
+        evaluation.residuals[i] = -1;
+    }
+    evaluation.residuals[0] = across / 1e-3;
+    evaluation.misfit = evaluation.residuals.squaredNorm();
+    return evaluation;
+}
+
+// A ridge from bound to bound: as toughness and modulus go where the length of the crack alone was measured.
+TEST(UnitCloseLook, ARidgeThroughTheBoxIsToldAsOne) {
+    const auto evaluate = [](const VectorXd& x, int) { return ridge(x[0] - 0.2 - 0.5 * x[1]); };
+    Objective objective(2, evaluate, 100, 1);
+    const auto look = look_close(objective, evaluate, true, Vector2d(0.4, 0.4), {{30}}, {"a", "b"}, 1);
+    ASSERT_TRUE(look);
+    const Uncertainty& found = look->uncertainty;
+    EXPECT_GT(found.covariance(0, 1) / std::sqrt(found.covariance(0, 0) * found.covariance(1, 1)), 0.99);
+    EXPECT_NE(found.message.find("'a' and 'b' cannot be told apart"), std::string::npos) << found.message;
+    EXPECT_NEAR(found.lower_95[0], 0.2, 0.02);
+    EXPECT_NEAR(found.upper_95[0], 0.7, 0.02);
+    EXPECT_NEAR(found.lower_95[1], 0.0, 1e-9);
+    EXPECT_NEAR(found.upper_95[1], 1.0, 1e-9);
+}
+
+// What is cheap nearby goes wrong farther off: a profile that ends by that alone tells nothing.
+TEST(UnitCloseLook, AProfileThatNoRunConfirmsEndsNothing) {
+    const auto evaluate = [](const VectorXd& x, int) { return ridge(x[0] - x[1]); };
+    const auto near = [](const VectorXd& x, int) {
+        Evaluation evaluation = ridge(x[0] - x[1]);
+        evaluation.residuals[1] += 50 * std::pow(x[0] - 0.5, 2);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(2, evaluate, 100, 1);
+    const auto believed = look_close(objective, near, true, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
+    ASSERT_TRUE(believed);
+    EXPECT_LT(believed->uncertainty.upper_95[0] - believed->uncertainty.lower_95[0], 0.9);
+    const auto look = look_close(objective, near, false, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
+    ASSERT_TRUE(look);
+    EXPECT_NE(look->uncertainty.message.find("'a' and 'b' cannot be told apart"), std::string::npos) << look->uncertainty.message;
+    for (int j = 0; j < 2; ++j) {
+        EXPECT_EQ(look->uncertainty.lower_95[j], 0.0) << j;
+        EXPECT_EQ(look->uncertainty.upper_95[j], 1.0) << j;
     }
 }
 
@@ -366,7 +415,7 @@ TEST(UnitCloseLook, GoesDownToALowerValleyThatItComesUpon) {
     int descents = 0;
     const auto look = [&] {
         return look_close(
-            objective, [](const VectorXd& x, int) { return two_valleys(x); }, objective.best()->x, {{30}}, {"a", "b"}, 1);
+            objective, [](const VectorXd& x, int) { return two_valleys(x); }, true, objective.best()->x, {{30}}, {"a", "b"}, 1);
     };
     const auto found = look_and_descend(objective, look, [&] {
         ++descents;
@@ -395,7 +444,7 @@ TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
     const auto found = look_and_descend(
         objective,
         [&] {
-            return look_close(objective, bowl(promised), best, {{30}}, {"a", "b"}, 1);
+            return look_close(objective, bowl(promised), true, best, {{30}}, {"a", "b"}, 1);
         },
         [] { FAIL() << "nothing is confirmed"; });
     ASSERT_TRUE(found);
