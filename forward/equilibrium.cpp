@@ -2,6 +2,7 @@
 
 #include "forward/deformation.hpp"
 #include "forward/local_yield.hpp"
+#include "forward/seen_strain.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -42,6 +43,9 @@ constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
 constexpr double least_strain = 1e-5;
+
+// Ties keep so much of their stiffness at least.
+constexpr double least_kept = 1e-3;
 
 }  // namespace
 
@@ -130,9 +134,38 @@ Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
     return stiffness * pair.normal * pair.normal.transpose();
 }
 
-Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const {
-    return shared_tie(pair, mass_) * Mat2::Identity() + face_stiffness(pair);
+// Ties stand for wood about a tip, or about the end of a held stretch, that no cell resolves. Where that has relaxed or flows,
+// they do: by the secant stiffness, stress times strain over the same if the wood were elastic.
+void Equilibrium::see_what_is_kept() {
+    std::vector<double> is(displacement_.size(), 0.0), elastic(displacement_.size(), 0.0);
+    for (int c = 0; c < body_.layout.cells(); ++c) {
+        if (!history_->is_in(c)) continue;
+        for_groups(body_.points, c, [&](const PointGroup& group) {
+            const SeenStrains seen(body_, *history_, group, displacement_, plan_.rotates);
+            for (int i = 0; i < group.count; ++i) {
+                const int p = group.first + i;
+                const Eigen::Vector3d& strain = seen.strain[i];
+                const Tensor stress = history_->stress(p, strain);
+                const double work = stress[0] * strain[0] + stress[1] * strain[1] + stress[3] * strain[2];
+                for (const int f : body_.points.node[p]) {
+                    is[f] += body_.points.volume[p] * work;
+                    elastic[f] += body_.points.volume[p] * strain.dot(body_.points.stiffness_of(p) * strain);
+                }
+            }
+        });
+    }
+    lost_by_ties_ += ties_energy();
+    kept_.assign(displacement_.size(), 1.0);
+    for (std::size_t f = 0; f < kept_.size(); ++f)
+        if (elastic[f] > 0.0) kept_[f] = std::clamp(is[f] / elastic[f], least_kept, 1.0);
+    lost_by_ties_ -= ties_energy();
 }
+
+double Equilibrium::tie_of(const FieldPair& pair) const {
+    return 0.5 * (kept(pair.left) + kept(pair.right)) * shared_tie(pair, mass_);
+}
+
+Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const { return tie_of(pair) * Mat2::Identity() + face_stiffness(pair); }
 
 double Equilibrium::closed_stiffness(const FieldPair& pair) const {
     return face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
@@ -167,7 +200,7 @@ void Equilibrium::find_forces() {
     }
     for (const Boundary::Tied& tie : boundary_.tied) {
         if (mass_[tie.field] == 0.0) continue;
-        const double pull = tie.stiffness * lag(tie);
+        const double pull = tie_of(tie) * lag(tie);
         force_[tie.field][tie.axis] += pull;
         reaction_[tie.driver][tie.axis] += pull;
     }
@@ -249,7 +282,7 @@ void Equilibrium::add_pairs() {
         const int cell = cell_at(pair.node);
         Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
         if (joins_faces_ && rubs(pair)) {
-            stiffness = (shared_tie(pair, mass_) + joint * closed_stiffness(pair)) * Mat2::Identity();
+            stiffness = (tie_of(pair) + joint * closed_stiffness(pair)) * Mat2::Identity();
         } else if (const Drag drag = face_drag(k); drag.limit > 0.0) {
             const Vec2 along = left_of(pair.normal);
             const Mat2 symmetric = drag.stiffness * along * along.transpose();
@@ -268,9 +301,9 @@ void Equilibrium::add_edge_ties() {
     for (const Boundary::Tied& tie : boundary_.tied) {
         if (mass_[tie.field] == 0.0) continue;
         Eigen::Matrix<double, 8, 8> stiffness = Eigen::Matrix<double, 8, 8>::Zero();
-        stiffness(tie.axis, tie.axis) = tie.stiffness;
+        stiffness(tie.axis, tie.axis) = tie_of(tie);
         add_extra(cell_at(cracks_.node_of_field[tie.field]), std::array{tie.field, -1, -1, -1}, stiffness);
-        step_load_[equation_[2 * tie.field + tie.axis]] += tie.stiffness * still_to_go_[tie.driver][tie.axis];
+        step_load_[equation_[2 * tie.field + tie.axis]] += tie_of(tie) * still_to_go_[tie.driver][tie.axis];
     }
 }
 
@@ -452,6 +485,7 @@ void Equilibrium::learn(Eigen::VectorXd step, Eigen::VectorXd force) {
 }
 
 Equilibrium::Outcome Equilibrium::solve(double time) {
+    if (history_) see_what_is_kept();
     prescribe(time);
     if (history_) history_->go_to(time);
     bool renew = true;
@@ -515,11 +549,15 @@ void Equilibrium::refine() {
 }
 
 double Equilibrium::strain_energy() const {
-    double energy = history_ ? internal_force_.energy(displacement_) : points_energy_;  // settled since then
+    return (history_ ? internal_force_.energy(displacement_) : points_energy_) + ties_energy();  // settled since then
+}
+
+double Equilibrium::ties_energy() const {
+    double energy = 0.0;
     for (const FieldPair& pair : cracks_.pairs)
-        energy += 0.5 * shared_tie(pair, mass_) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
+        energy += 0.5 * tie_of(pair) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
     for (const Boundary::Tied& tie : boundary_.tied)
-        if (mass_[tie.field] > 0.0) energy += 0.5 * tie.stiffness * lag(tie) * lag(tie);
+        if (mass_[tie.field] > 0.0) energy += 0.5 * tie_of(tie) * lag(tie) * lag(tie);
     return energy;
 }
 
@@ -533,8 +571,8 @@ double Equilibrium::traction_work() const {
 
 double Equilibrium::potential() const {
     if (!potential_)
-        potential_ =
-            strain_energy() + contact_energy_ + face_energy_ + (history_ ? history_->dissipated() : 0.0) - traction_work();
+        potential_ = strain_energy() + contact_energy_ + face_energy_ +
+                     (history_ ? history_->dissipated() + lost_by_ties_ : 0.0) - traction_work();
     return *potential_;
 }
 

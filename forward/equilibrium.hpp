@@ -105,6 +105,8 @@ class Equilibrium {
         std::vector<Grip> faces;                // [pairs]
         std::vector<double> dissipated;         // by each of those bodies, and by all crack faces [J]
         History::State history;                 // of wood that remembers
+        std::vector<double> kept;               // [fields] of stiffness by that wood
+        double lost_by_ties;                    // with what it did not keep [J]
     };
     Contacts contacts() const;
 
@@ -159,6 +161,11 @@ class Equilibrium {
     bool take_in_spread();
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
+    void see_what_is_kept();
+    double ties_energy() const;
+    double kept(int field) const { return field < static_cast<int>(kept_.size()) ? kept_[field] : 1.0; }
+    double tie_of(const FieldPair& pair) const;
+    double tie_of(const Boundary::Tied& tie) const { return kept(tie.field) * tie.stiffness; }
     Mat2 pair_stiffness(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
     double closed_stiffness(const FieldPair& pair) const;
@@ -207,6 +214,8 @@ class Equilibrium {
     std::vector<double> mass_;        // [kg]
     std::vector<Vec2> displacement_;  // [m]
     std::vector<Vec2> force_;         // out of balance [N]
+    std::vector<double> kept_;        // of the wood's stiffness there after the last step; empty: all
+    double lost_by_ties_ = 0;         // with what was not kept [J]
 
     std::vector<Vec2> reaction_;               // [drivers] [N]
     double points_energy_ = 0;                 // as the forces were found [J]

@@ -366,23 +366,27 @@ void Equilibrium::settle() {
 double Equilibrium::dissipated() const {
     double sum = face_dissipated_;
     for (const SlidingBody& body : sliding_) sum += body.dissipated();
-    if (history_) sum += history_->dissipated();
+    if (history_) sum += history_->dissipated() + lost_by_ties_;
     return sum;
 }
 
 Equilibrium::Contacts Equilibrium::contacts() const {
-    Contacts contacts{moved_, {}, face_grips_, {}, {}};
+    Contacts contacts{moved_, {}, face_grips_, {}, {}, {}, 0.0};
     for (const SlidingBody& body : sliding_) {
         contacts.bodies.push_back(body.grips());
         contacts.dissipated.push_back(body.dissipated());
     }
     contacts.dissipated.push_back(face_dissipated_);
     if (history_) contacts.history = history_->save();
+    contacts.kept = kept_;
+    contacts.lost_by_ties = lost_by_ties_;
     return contacts;
 }
 
 void Equilibrium::set_contacts(const Contacts& contacts) {
     if (history_) history_->restore(contacts.history);
+    kept_ = contacts.kept;
+    lost_by_ties_ = contacts.lost_by_ties;
     const bool at_start = contacts.moved.empty();
     moved_ = at_start ? seat_ : contacts.moved;
     for (std::size_t i = 0; i < sliding_.size(); ++i)

@@ -118,7 +118,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         if (mass_[tie.field] == 0.0) continue;
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             const double stiffer = numbers[n].opening_modulus(tie.place, 0.5 * body_.layout.cell, tie.along) / tie.plane_modulus;
-            const double pull = stiffer * tie.stiffness * lag(tie);
+            const double pull = stiffer * tie_of(tie) * lag(tie);
             slope.potential[n] += 0.5 * pull * lag(tie);
             slope.fields(2 * tie.field + tie.axis, n) -= pull;
             slope.drivers(2 * tie.driver + tie.axis, n) += pull;

@@ -502,6 +502,46 @@ TEST(VerificationHistory, ComesToElasticWood) {
     }
 }
 
+// What stands for a tip, or for the end of a held stretch, within a cell relaxes as the wood does: with k = g all forces are
+// those of elastic wood times the same function of time, wherever in a cell it lies.
+TEST(VerificationHistory, TipsAndEndsWithinACellRelaxAsTheWood) {
+    const double share = 0.95, tau = 1.0, ramp = 0.1, end = 20.0;
+    const auto integral = [&](double t) { return t - share * (t + tau * std::expm1(-t / tau)); };
+    const double left = (integral(end) - integral(end - ramp)) / ramp;
+    const auto force_of = [&](const Material& wood, double tip, double stretch) {
+        Scene scene = at_equilibrium(block({10e-3, 5e-3}, 0.5e-3));
+        scene.materials["EW"] = wood;
+        scene.edges = {moving("top", Side::top, {0.0, 1e-7}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.edges[0].until = ramp;
+        if (stretch > 0.0) scene.edges[0].range = {{0.0, stretch}};
+        if (tip > 0.0) {
+            Crack crack;
+            crack.points = {Vec2(0.0, 2.5e-3), Vec2(tip, 2.5e-3)};
+            scene.cracks = {crack};
+        }
+        scene.measure = {"top", "top"};
+        scene.stop.time = end;
+        const Record record = simulate(scene);
+        EXPECT_EQ(record.status, RunStatus::finished) << record.message;
+        EXPECT_LT(record.worst_energy_imbalance, 0.01);
+        return record.series.back().force;
+    };
+    for (const auto& [tip, stretch] : {std::pair{4e-3, 0.0},
+                                       {4.1e-3, 0.0},
+                                       {4.2e-3, 0.0},
+                                       {4.3e-3, 0.0},
+                                       {4.4e-3, 0.0},
+                                       std::pair{0.0, 5e-3},
+                                       {0.0, 5.15e-3},
+                                       {0.0, 5.3e-3}}) {
+        const double off =
+            force_of(relaxing(share, tau), tip, stretch) / (left * force_of(relaxing(1e-9, 1e6), tip, stretch)) - 1;
+        std::printf("%s at %.2f mm: relaxed force off by %+.2f %%\n", tip > 0.0 ? "tip" : "end of a stretch",
+                    1e3 * (tip + stretch), 100 * off);
+        EXPECT_LT(std::abs(off), 0.005);
+    }
+}
+
 // Wood that relaxes within the run, but not while a tip passes a cell: a crack in motion takes up the toughness, later than in
 // elastic wood, and the books close. Where nothing relaxes it is elastic wood.
 TEST(VerificationHistory, CrackRunsThroughViscoelasticWood) {
