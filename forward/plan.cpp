@@ -140,7 +140,6 @@ void check_solver(const Scene& scene, bool quasistatic, bool orthotropic) {
                    "\"quasistatic\", or give its velocity");
 }
 
-// What slides must not lie in the wood at the start; what it touches may be off by what the points of cut cells are.
 // Which sides of a crack, right and left, have points within a cell of it.
 std::array<bool, 2> sides_with_points(const Discretisation& body, const Crack& crack) {
     const double cell = body.layout.cell.maxCoeff();
@@ -159,12 +158,7 @@ std::array<bool, 2> sides_with_points(const Discretisation& body, const Crack& c
     return found;
 }
 
-bool is_seen(const Discretisation& body, const Crack& crack) {
-    const auto [right, left] = sides_with_points(body, crack);
-    return right && left;
-}
-
-// Asked of those alone that come that close to the outline on all of their way.
+// Asked of those alone that are as close to the outline on all of their way.
 bool wide_cells_see_cracks(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
     const double cell = 2.0 * body.layout.cell.maxCoeff();
     const Vec2 size = body.layout.size();
@@ -173,7 +167,8 @@ bool wide_cells_see_cracks(const Scene& scene, const MaterialMap& materials, con
     return std::all_of(scene.cracks.begin(), scene.cracks.end(), [&](const Crack& crack) {
         if (std::any_of(crack.points.begin(), crack.points.end(), is_far_in)) return true;
         if (!wide) wide.emplace(scene, materials, Layout::of(scene, 2.0 * body.layout.cell));
-        return is_seen(*wide, crack);
+        const auto [right, left] = sides_with_points(*wide, crack);
+        return right && left;
     });
 }
 
@@ -201,6 +196,7 @@ void check_cracks(const Scene& scene, const Discretisation& body) {
     }
 }
 
+// What slides must not lie in the wood at the start; what it touches may be off by what the points of cut cells are.
 void check_bodies(const Scene& scene, const Discretisation& body) {
     const double hair = 0.05 * body.layout.cell.minCoeff();
     for (const Body& rigid : scene.bodies) {
