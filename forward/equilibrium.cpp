@@ -137,6 +137,7 @@ Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
 // Ties stand for wood about a tip, or about the end of a held stretch, that no cell resolves. Where that has relaxed or flows,
 // they do: by the secant stiffness, stress times strain over the same if the wood were elastic.
 void Equilibrium::see_what_is_kept() {
+    if (cracks_.pairs.empty() && boundary_.tied.empty()) return;
     std::vector<double> is(displacement_.size(), 0.0), elastic(displacement_.size(), 0.0);
     for (int c = 0; c < body_.layout.cells(); ++c) {
         if (!history_->is_in(c)) continue;

@@ -250,19 +250,16 @@ CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
             inverse * uncertainty.covariance * inverse.transpose()};
 }
 
-std::optional<CloseLook> look_close(Objective& objective, const Objective::Evaluate& near, bool near_is_exact,
-                                    const Eigen::VectorXd& x, const MeasuredCurves& curves, const std::vector<std::string>& names,
-                                    unsigned seed) {
+std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, const Eigen::VectorXd& x,
+                                    const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed) {
     // Nothing where the user's stop comes before the first run.
     const auto look = [&](const Window& window) -> std::optional<CloseLook> {
-        const auto evaluate = [near, window](const Eigen::VectorXd& y, int threads) {
+        const auto evaluate = [near = near.run, window](const Eigen::VectorXd& y, int threads) {
             const Eigen::VectorXd wanted = window.inside(y), at = in_box(wanted);
             return (wanted - at).cwiseAbs().maxCoeff() < rounding ? near(at, threads) : Evaluation{"outside the bounds", {}, {}};
         };
-        CloseLook here{window,
-                       Objective(x.size(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()),
-                       {},
-                       near};
+        CloseLook here{
+            window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), near.threads, objective.stop()), {}, near.run};
         spread_about(x, here, seed);
         if (!here.objective.best()) {
             return std::nullopt;
@@ -270,7 +267,7 @@ std::optional<CloseLook> look_close(Objective& objective, const Objective::Evalu
         here.uncertainty = estimate_uncertainty(here.objective, curves, names, difference_step, window);
         return here;
     };
-    const auto first = look(as_wide_as_the_misfit_says(near, x));
+    const auto first = look(as_wide_as_the_misfit_says(near.run, x));
     if (!first) {
         return std::nullopt;
     }
@@ -287,7 +284,7 @@ std::optional<CloseLook> look_close(Objective& objective, const Objective::Evalu
         found = std::move(*here);
     }
     const auto confirm = [&](const Eigen::VectorXd& there, double misfit, double rise_there) {
-        if (near_is_exact) {
+        if (near.exact) {
             return true;
         }
         const auto run = objective.at(there);

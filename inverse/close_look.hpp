@@ -29,18 +29,23 @@ struct CloseLook {
     Along along(Eigen::Index parameter) const;
 };
 
+/// Cheap runs near a point of the box.
+struct NearRuns {
+    Objective::Evaluate run;
+    bool exact;   // else to first order in some parameters
+    int threads;  // side by side; 1 where each depends on the one before in its last digits
+};
+
 /// Intervals about a point x [parameters] where runs nearby, `near`, are cheap. The window is as wide as the misfit says, so that
 /// its differences span what the intervals do: a curve with jumps has kinks that a derivative at a point does not see, and wide
 /// differences are blunt where the data are sharp. It lies along the principal axes of the covariance, found by turns: where
 /// parameters stand in for one another, as a tough wood for a stiff one, along no axis of the box do differences stay in the
 /// valley and yet go as far as its intervals. The intervals take in those of the profile likelihood, as at the edge of a jump
 /// the misfit is no parabola; where that does not end and differences see no slope, the parameters cannot be told.
-/// Where `near` is not exact in all parameters, runs that the objective makes at their ends confirm such a profile.
-/// `objective` says how many threads there are and when to stop: nothing comes back where that is before the first run;
-/// `curves` and `names` as in `estimate_uncertainty`.
-std::optional<CloseLook> look_close(Objective& objective, const Objective::Evaluate& near, bool near_is_exact,
-                                    const Eigen::VectorXd& x, const MeasuredCurves& curves, const std::vector<std::string>& names,
-                                    unsigned seed);
+/// Where `near` is not exact, runs that `objective` makes at the ends of such a profile confirm it. It says when to stop, too:
+/// nothing comes back where that is before the first run. `curves` and `names` as in `estimate_uncertainty`.
+std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, const Eigen::VectorXd& x,
+                                    const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed);
 
 /// Whether a run is lower than another by more than what is as good as the same, with what is said `about` the place.
 bool is_lower(const Run& one, const Run& other, const Uncertainty& about);

@@ -216,7 +216,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
                 const std::vector<bool> exact = runs.walks().exact_near();
                 const bool all_exact = std::all_of(exact.begin(), exact.end(), [](bool one) { return one; });
-                return look_close(objective, runs.nearby().near(x), all_exact, x, model.curves(), names, options.seed);
+                const NearRuns near{runs.nearby().near(x), all_exact, runs.walks().depend_on_order() ? 1 : objective.threads()};
+                return look_close(objective, near, x, model.curves(), names, options.seed);
             };
             // A method that the study names has had its search; a lower point that a look comes upon is taken as it is.
             close = look_and_descend(objective, look, [&] {

@@ -297,7 +297,7 @@ TEST(UnitCloseLook, GivesWhatIsKnownWhenTheUserStops) {
             return curved(x);
         };
         Objective objective(2, curved, 100, 1, &stop);
-        const auto look = look_close(objective, evaluate, true, lowest, {{3}}, {"a", "b"}, 1);
+        const auto look = look_close(objective, {evaluate, true, 1}, lowest, {{3}}, {"a", "b"}, 1);
         if (!look) {
             EXPECT_TRUE(stop) << runs;
             continue;
@@ -330,7 +330,7 @@ TEST(UnitCloseLook, GoesAlongAValleyAskewToTheParameters) {
             return evaluation;
         };
         Objective objective(2, valley, 100, 1);
-        const auto look = look_close(objective, valley, true, bottom, {{30}}, {"a", "b"}, 1);
+        const auto look = look_close(objective, {valley, true, 1}, bottom, {{30}}, {"a", "b"}, 1);
         ASSERT_TRUE(look);
         const Uncertainty& found = look->uncertainty;
         const auto error_along = [&](const Vector2d& way) { return std::sqrt(0.5 * way.dot(found.covariance * way)); };
@@ -360,7 +360,7 @@ Evaluation ridge(double across) {
 TEST(UnitCloseLook, ARidgeThroughTheBoxIsToldAsOne) {
     const auto evaluate = [](const VectorXd& x, int) { return ridge(x[0] - 0.2 - 0.5 * x[1]); };
     Objective objective(2, evaluate, 100, 1);
-    const auto look = look_close(objective, evaluate, true, Vector2d(0.4, 0.4), {{30}}, {"a", "b"}, 1);
+    const auto look = look_close(objective, {evaluate, true, 1}, Vector2d(0.4, 0.4), {{30}}, {"a", "b"}, 1);
     ASSERT_TRUE(look);
     const Uncertainty& found = look->uncertainty;
     EXPECT_GT(found.covariance(0, 1) / std::sqrt(found.covariance(0, 0) * found.covariance(1, 1)), 0.99);
@@ -381,10 +381,10 @@ TEST(UnitCloseLook, AProfileThatNoRunConfirmsEndsNothing) {
         return evaluation;
     };
     Objective objective(2, evaluate, 100, 1);
-    const auto believed = look_close(objective, near, true, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
+    const auto believed = look_close(objective, {near, true, 1}, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
     ASSERT_TRUE(believed);
     EXPECT_LT(believed->uncertainty.upper_95[0] - believed->uncertainty.lower_95[0], 0.9);
-    const auto look = look_close(objective, near, false, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
+    const auto look = look_close(objective, {near, false, 1}, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
     ASSERT_TRUE(look);
     EXPECT_NE(look->uncertainty.message.find("'a' and 'b' cannot be told apart"), std::string::npos) << look->uncertainty.message;
     for (int j = 0; j < 2; ++j) {
@@ -414,8 +414,8 @@ TEST(UnitCloseLook, GoesDownToALowerValleyThatItComesUpon) {
     objective.at(Vector2d(0.38, 0.5));
     int descents = 0;
     const auto look = [&] {
-        return look_close(
-            objective, [](const VectorXd& x, int) { return two_valleys(x); }, true, objective.best()->x, {{30}}, {"a", "b"}, 1);
+        return look_close(objective, {[](const VectorXd& x, int) { return two_valleys(x); }, true, 1}, objective.best()->x,
+                          {{30}}, {"a", "b"}, 1);
     };
     const auto found = look_and_descend(objective, look, [&] {
         ++descents;
@@ -444,7 +444,7 @@ TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
     const auto found = look_and_descend(
         objective,
         [&] {
-            return look_close(objective, bowl(promised), true, best, {{30}}, {"a", "b"}, 1);
+            return look_close(objective, {bowl(promised), true, 1}, best, {{30}}, {"a", "b"}, 1);
         },
         [] { FAIL() << "nothing is confirmed"; });
     ASSERT_TRUE(found);
