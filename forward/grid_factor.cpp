@@ -156,14 +156,9 @@ double* GridFactor::column_of(Box& box, int c) {
     return box.left.data() + static_cast<std::ptrdiff_t>(c - box.inner) * box.border - box.inner;
 }
 
-// Equations that follow each other both in what a half has left and in the front of its parent.
-struct GridFactor::Run {
-    int from, to, length;
-};
-
-std::vector<GridFactor::Run> GridFactor::runs(const Box& box, int h) const {
+void GridFactor::find_runs(const Box& box, int h, std::vector<Run>& runs) const {
     const Box& half = boxes_[box.half[h]];
-    std::vector<Run> runs;
+    runs.clear();
     int at = 0;
     for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
         const int to = box.offset[box.slot[h][k]];
@@ -172,18 +167,17 @@ std::vector<GridFactor::Run> GridFactor::runs(const Box& box, int h) const {
         else runs.push_back({at, to, length});
         at += length;
     }
-    return runs;
 }
 
 // The front of a box is what its halves have left. Column by column, so that each is at hand.
-void GridFactor::take_in_halves(Box& box) const {
-    const std::array<std::vector<Run>, 2> of_half{runs(box, 0), runs(box, 1)};
+void GridFactor::take_in_halves(Box& box, Scratch& scratch) const {
+    for (int h = 0; h < 2; ++h) find_runs(box, h, scratch.runs[h]);
     std::array<std::size_t, 2> at{0, 0};
     for (int c = 0; c < box.offset.back(); ++c) {
         double* to = column_of(box, c);
         std::fill(to + c, to + box.offset.back(), 0.0);
         for (int h = 0; h < 2; ++h) {
-            const std::vector<Run>& runs = of_half[h];
+            const std::vector<Run>& runs = scratch.runs[h];
             std::size_t& r = at[h];
             while (r < runs.size() && runs[r].to + runs[r].length <= c) ++r;
             if (r == runs.size() || runs[r].to > c) continue;
@@ -233,7 +227,7 @@ bool GridFactor::eliminate(Box& box) {
 
 void GridFactor::fill(Box& box, const Assemble& assemble, Scratch& scratch) const {
     if (box.half[0] < 0) assemble_leaf(box, assemble, scratch);
-    else take_in_halves(box);
+    else take_in_halves(box, scratch);
 }
 
 bool GridFactor::factor_box(Box& box, const Assemble& assemble, Scratch& scratch) {

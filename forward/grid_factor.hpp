@@ -79,9 +79,15 @@ class GridFactor {
         int failed_at = -1;  // inner equation; -1: none
     };
 
+    // Equations that follow each other both in what a half has left and in the front of its parent.
+    struct Run {
+        int from, to, length;
+    };
+
     struct Scratch {             // of one box
         std::vector<int> local;  // [equations] place in its front
         std::vector<Element> elements;
+        std::array<std::vector<Run>, 2> runs;  // [halves]
     };
 
     int add_box(int i0, int i1, int j0, int j1);
@@ -93,9 +99,8 @@ class GridFactor {
     void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
     void take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const;
     static double* column_of(Box& box, int c);
-    struct Run;
-    std::vector<Run> runs(const Box& box, int half) const;
-    void take_in_halves(Box& box) const;
+    void find_runs(const Box& box, int half, std::vector<Run>& runs) const;
+    void take_in_halves(Box& box, Scratch& scratch) const;
     static bool eliminate(Box& box);
     template <class Visit>
     void upward(int top, int forks, const Visit& visit) const;
