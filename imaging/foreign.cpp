@@ -1,10 +1,14 @@
 #include "imaging/foreign.hpp"
 
+#include "imaging/quantile.hpp"
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <vector>
 
 namespace crampfit {
 namespace {
@@ -12,12 +16,14 @@ namespace {
 constexpr double too_dark = 0.25;       // below LW, of the contrast
 constexpr double dark_line = 0.5;       // a crack below its ring, of the contrast
 constexpr double light_line = 0.33;     // a ray above its ring, of the contrast
-constexpr double too_blue = 0.08;       // blue above red: wood is never bluer than white light
+constexpr double slender = 0.25;        // thickness of a line, of its length, at most
+constexpr double too_blue = 0.08;       // blue above red: wood is never bluer than the light on it
 constexpr double too_green = 0.04;      // green above red and blue
 constexpr double blank_white = 0.92;    // of the brightest in the picture, in each colour
 constexpr double blank_grain = 0.012;   // largest standard deviation over a few pixels: wood has more
 constexpr double least_blank = 0.0005;  // of the picture
 constexpr double most_within = 0.25;    // of blank's area, that is as plain elsewhere: more, and wood itself is
+constexpr double most_noise = 0.03;     // largest standard deviation of a ground's pixels: a camera's in poor light
 
 double number(Feature feature) { return static_cast<double>(feature); }
 
@@ -26,13 +32,25 @@ cv::Mat disk(double radius) {
     return cv::getStructuringElement(cv::MORPH_ELLIPSE, {size, size});
 }
 
-/// 255 where hue cannot be wood's.
+/// The median of `colour` over `other` in the middle of the picture, where the specimen is, without what is black; at least 1.
+double cast(const cv::Mat& colour, const cv::Mat& other) {
+    std::vector<float> ratios;
+    for (int v = colour.rows / 4; v < colour.rows - colour.rows / 4; v += 2)
+        for (int u = colour.cols / 4; u < colour.cols - colour.cols / 4; u += 2)
+            if (other.at<float>(v, u) > 0.1f) ratios.push_back(colour.at<float>(v, u) / other.at<float>(v, u));
+    return std::max(1.0, quantile(std::move(ratios), 0.5));
+}
+
+/// 255 where hue cannot be wood's. In white light wood has no more blue than red, and no more green: where most of it has, that
+/// is the light's.
 cv::Mat strange_hue(const cv::Mat& bgr, cv::Size size) {
     if (bgr.empty()) return cv::Mat::zeros(size, CV_8U);
     cv::Mat smooth;
     cv::GaussianBlur(bgr, smooth, {}, 1.5);
     cv::Mat channel[3];
     cv::split(smooth, channel);
+    channel[0] /= cast(channel[0], channel[2]);
+    channel[1] /= cast(channel[1], cv::max(channel[0], channel[2]));
     return ((channel[0] - channel[2]) > too_blue) |
            (((channel[1] - channel[2]) > too_green) & ((channel[1] - channel[0]) > too_green));
 }
@@ -84,6 +102,24 @@ cv::Mat pick_by_length(const cv::Mat& mask, const cv::Mat& coordinate, const Wan
     return chosen_patches(patches, chosen);
 }
 
+/// Long dark patches whichever way they run. LW is long and dark, too, but not as much darker than LW is elsewhere. Nothing is
+/// smoothed: of a line of three pixels that would leave little.
+cv::Mat long_dark(const cv::Mat& gray, const WoodLevels& levels, double ring_width) {
+    return pick(gray < levels.latewood - dark_line * levels.contrast(), [&](const int* box) {
+        const double length = std::hypot(box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]);
+        return length > std::max(8.0, 0.4 * ring_width) && box[cv::CC_STAT_AREA] < slender * length * length;
+    });
+}
+
+/// A dark line with the pixels right beside it that are nearer to its gray than to that of the wood there.
+cv::Mat with_rim(const cv::Mat& line, const cv::Mat& gray) {
+    cv::Mat wide, darkest, brightest;
+    cv::dilate(line, wide, disk(1));
+    cv::erode(gray, darkest, disk(3));
+    cv::dilate(gray, brightest, disk(3));
+    return line | (wide & (gray < 0.5 * (darkest + brightest)));
+}
+
 /// At twenty pixels a ring, which is fine enough for an outline and makes the cost one of the picture's size alone.
 cv::Mat find_background(const cv::Mat& strange, double ring_width) {
     const double scale = std::min(1.0, 20 / ring_width), width = scale * ring_width;
@@ -112,9 +148,72 @@ cv::Mat extreme_colour(const cv::Mat& gray, const cv::Mat& bgr, bool brightest) 
                      : cv::min(channel[0], cv::min(channel[1], channel[2]));
 }
 
+/// Patches of `plain` that reach in from a corner.
+cv::Mat pick_from_corners(const cv::Mat& plain) {
+    const cv::Size size = plain.size();
+    return pick(plain, [&](const int* box) {
+        const bool left = box[cv::CC_STAT_LEFT] <= 4, top = box[cv::CC_STAT_TOP] <= 4;
+        const bool right = box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] >= size.width - 4;
+        const bool bottom = box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] >= size.height - 4;
+        return (left || right) && (top || bottom) && box[cv::CC_STAT_AREA] > least_blank * static_cast<double>(size.area());
+    });
+}
+
+/// Whether gray is another beyond at least this share of a patch's rim; light that fades has no rim.
+bool has_rim(const cv::Mat& patch, const cv::Mat& other, double least) {
+    cv::Mat near, far;
+    cv::dilate(patch, near, disk(6));
+    cv::dilate(patch, far, disk(10));
+    const cv::Mat beyond = far & (near == 0);
+    return cv::countNonZero(beyond & other) > least * cv::countNonZero(beyond);
+}
+
+/// The patches that reach in from a corner, if they lie around something: they have a rim, beyond a share of which `other` is,
+/// and there is hardly anything as plain within.
+cv::Mat around_something(const cv::Mat& plain, const cv::Mat& other, double rim) {
+    cv::Mat open;
+    cv::morphologyEx(plain, open, cv::MORPH_OPEN, disk(4));
+    const cv::Mat around = pick_from_corners(open);
+    const int area = cv::countNonZero(around);
+    if (area > 0 && cv::countNonZero(open) - area <= most_within * area && has_rim(around, other, rim)) return around;
+    return cv::Mat::zeros(plain.size(), CV_8U);
+}
+
+/// Gray of an even ground, and the standard deviation of its pixels.
+struct Ground {
+    double gray = 0, noise = 0;
+
+    /// By which the mean of a few of its pixels may differ: light is never quite even.
+    double tolerance() const { return std::max(3 * noise, 0.02); }
+    /// Of a few pixels; what rounding to whole grays adds is in it.
+    double most_scatter() const { return 2 * noise + 0.008; }
+};
+
+/// The ground that at least three of a picture's corners show: two may lie in the same ring.
+std::optional<Ground> ground_in_corners(const cv::Mat& gray) {
+    constexpr int side = 9, least_corners = 3;
+    std::vector<Ground> corners;
+    for (const int x : {0, gray.cols - side})
+        for (const int y : {0, gray.rows - side}) {
+            cv::Scalar mean, deviation;
+            cv::meanStdDev(gray(cv::Rect(x, y, side, side)), mean, deviation);
+            corners.push_back({mean[0], deviation[0]});
+        }
+    std::ranges::sort(corners, {}, &Ground::noise);
+    for (const Ground& one : corners) {
+        const auto alike = std::ranges::count_if(corners, [&](const Ground& other) {
+            return std::abs(other.gray - one.gray) < one.tolerance() && other.noise < one.most_scatter();
+        });
+        if (one.noise < most_noise && alike >= least_corners) return one;
+    }
+    return std::nullopt;
+}
+
 }  // namespace
 
 cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black) {
+    constexpr double apart = 0.03;  // beyond the limit of black or white: another gray for sure
+    constexpr double rim = 0.1;     // EW may be as white as the ground, LW is not
     cv::Mat mean, squares;
     cv::blur(gray, mean, {5, 5});
     cv::blur(gray.mul(gray), squares, {5, 5});
@@ -123,20 +222,39 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black) {
     for (const bool dark : {true, false}) {
         cv::Mat colour;
         cv::blur(extreme_colour(gray, bgr, dark), colour, {5, 5});
-        cv::Mat plain = even & (dark ? cv::Mat(colour < black) : cv::Mat(colour > blank_white));
-        cv::morphologyEx(plain, plain, cv::MORPH_OPEN, disk(4));
-        const cv::Size size = plain.size();
-        const cv::Mat around = pick(plain, [&](const int* box) {
-            const bool left = box[cv::CC_STAT_LEFT] <= 4, top = box[cv::CC_STAT_TOP] <= 4;
-            const bool right = box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] >= size.width - 4;
-            const bool bottom = box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] >= size.height - 4;
-            return (left || right) && (top || bottom) && box[cv::CC_STAT_AREA] > least_blank * static_cast<double>(size.area());
-        });
-        const int area = cv::countNonZero(around);
-        if (cv::countNonZero(plain) - area <= most_within * area) blank |= around;
+        blank |= dark ? around_something(even & (colour < black), colour > black + apart, rim)
+                      : around_something(even & (colour > blank_white), colour < blank_white - apart, rim);
     }
-    if (cv::countNonZero(blank) > 0) cv::dilate(blank, blank, disk(4));  // its blurred rim
+    cv::Scalar rest, scatter;
+    cv::Mat within;
+    cv::dilate(blank, within, disk(8));
+    cv::meanStdDev(gray, rest, scatter, within == 0);
+    if (scatter[0] < 2 * blank_grain) return cv::Mat::zeros(gray.size(), CV_8U);  // around nothing
+    if (cv::countNonZero(blank) > 0) cv::dilate(blank, blank, disk(4));           // its blurred rim
     return blank;
+}
+
+cv::Mat find_ground(const cv::Mat& gray) {
+    constexpr double apart = 0.03;  // beyond the tolerance: another gray for sure
+    constexpr double rim = 0.85;    // of EW in falling light, the half that runs along its ring
+    cv::Mat none = cv::Mat::zeros(gray.size(), CV_8U);
+    const std::optional<Ground> ground = ground_in_corners(gray);
+    if (!ground) return none;
+    cv::Mat mean, squares;
+    cv::blur(gray, mean, {5, 5});
+    cv::blur(gray.mul(gray), squares, {5, 5});
+    const cv::Mat off = cv::abs(mean - ground->gray);
+    const cv::Mat plain = (off < ground->tolerance()) & (squares - mean.mul(mean) < std::pow(ground->most_scatter(), 2));
+    cv::Mat around = around_something(plain, off > ground->tolerance() + apart, rim);
+    // Over a larger stretch noise is gone, and what is left of wood is its mottle and the light on it.
+    cv::Mat inside;
+    cv::erode(around, inside, disk(8));
+    cv::Scalar middle, drift;
+    cv::blur(gray, mean, {15, 15});
+    cv::meanStdDev(mean, middle, drift, inside);
+    if (drift[0] > std::max(ground->noise, 0.5 * ground->tolerance())) return none;
+    cv::dilate(around, around, disk(4));  // its blurred rim
+    return around;
 }
 
 cv::Mat find_foreign(const WoodView& view) {
@@ -150,10 +268,10 @@ cv::Mat find_foreign(const WoodView& view) {
     cv::GaussianBlur(gray, smooth, {}, 0.7);
     cv::Mat inked;
     cv::dilate(hue | background, inked, disk(3));
-    const auto lines = [&](const cv::Mat& mask, double least) {
+    const auto lines = [&](const cv::Mat& mask, double least, double thickest) {
         return pick_by_length(mask & (inked == 0), coordinate, [&](double length, double area) {
             const double thickness = area / length;
-            return length > std::max(8.0, least * width) && thickness < 0.25 * length && thickness < 0.2 * width;
+            return length > std::max(8.0, least * width) && thickness < slender * length && thickness < thickest * width;
         });
     };
     cv::Mat features(gray.size(), CV_8U, cv::Scalar(number(Feature::wood)));
@@ -165,8 +283,12 @@ cv::Mat find_foreign(const WoodView& view) {
                        return across >= 3 && length < 1.8 * across && length < 0.2 * width &&
                               box[cv::CC_STAT_AREA] > 0.5 * length * across;
                    }));
-    features.setTo(number(Feature::ray), lines(smooth > around + light_line * contrast, 0.15));
-    features.setTo(number(Feature::crack), lines(smooth < around - dark_line * contrast, 0.4));
+    features.setTo(number(Feature::ray), lines(smooth > around + light_line * contrast, 0.15, 0.2));
+    // A broad crack darkens the gray around, too: what is too dark for wood need not be darker than that.
+    const cv::Mat cracks = lines(smooth < around - dark_line * contrast, 0.4, 0.2) |
+                           lines(patches, 0.4, std::numeric_limits<double>::infinity()) |
+                           (long_dark(gray, levels, width) & (inked == 0));
+    features.setTo(number(Feature::crack), with_rim(cracks, smooth));
     features.setTo(number(Feature::background), background);
     return features;
 }

@@ -22,9 +22,14 @@ struct WoodView {
 /// wood is. `gray` and `bgr` as in a view; `black` is the brightest black, of the picture's brightest.
 cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black = 0.08);
 
+/// 255 where the picture shows a ground of any one gray, as even as noise, that reaches in from at least three of its corners.
+/// Rings show the same gray within, too, and no even one where the light on them is not. `gray` as in a view.
+cv::Mat find_ground(const cv::Mat& gray);
+
 /// What in a picture is no plain wood, as a map of `Feature` numbers:
 /// - background: too dark for wood, or green or blue, and connected to the picture's edge; islands in it, too
-/// - crack: a thin line across the rings, darker than its ring around it by half the contrast of LW to EW
+/// - crack: a line across the rings, up to a fifth of a ring thick and darker than its ring around it by half the contrast of LW
+///   to EW, or of any thickness and too dark; or one that runs any way and is darker than LW by half the contrast
 /// - ray: the same, lighter by a third
 /// - resin canal: a round spot that is lighter by a third, up to a fifth of a ring wide
 /// - mark: other patches that are too dark, or blue or green: ink, holes, dirt

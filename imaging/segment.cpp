@@ -8,6 +8,7 @@
 #include "imaging/growth.hpp"
 #include "imaging/pith.hpp"
 #include "imaging/pixels.hpp"
+#include "imaging/quantile.hpp"
 #include "imaging/resolution_tag.hpp"
 #include "imaging/ring_figures.hpp"
 
@@ -27,7 +28,10 @@ constexpr double least_coherency = 0.25;      // of the picture; noise has some 
 constexpr int least_side = 16;                // pixels
 constexpr std::size_t most_pixels = 1 << 26;  // some hundred bytes are needed for each
 
-/// Gray and colour as float, the brightest value 1.
+constexpr double brightest_share = 0.999;  // of the pixels are no brighter than what counts as brightest: glints and hot pixels
+constexpr double most_void = 0.5;          // of the picture: more is worth a warning
+
+/// Gray and colour as float, the brightest value 1, but for a few pixels.
 struct Pixels {
     cv::Mat gray;
     cv::Mat bgr;  // empty: the picture is gray
@@ -47,10 +51,16 @@ Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
     cv::minMaxLoc(gray, &darkest, &brightest);
     if (!(brightest > darkest))
         fail(brightest > 0 ? "shows nothing: all pixels are equally bright" : "shows nothing: all pixels are black");
-    gray.convertTo(pixels.gray, CV_32F, 1 / brightest);
+    gray.convertTo(pixels.gray, CV_32F);
+    const double usual = quantile({pixels.gray.begin<float>(), pixels.gray.end<float>()}, brightest_share);
+    if (usual > darkest) brightest = usual;  // else nearly all is as dark as the darkest
+    pixels.gray = cv::min(pixels.gray / brightest, 1.0);
     if (stored.channels() == 3) stored.convertTo(pixels.bgr, CV_32FC3, 1 / brightest);
     return pixels;
 }
+
+/// 255 where no specimen is photographed.
+cv::Mat blank_of(const Pixels& pixels) { return find_blank(pixels.gray, pixels.bgr) | find_ground(pixels.gray); }
 
 /// Everything found in one round.
 struct Round {
@@ -276,7 +286,7 @@ OrientationField orientation_of(const std::filesystem::path& image, cv::Size siz
         throw InputError(key.file, key.key, image.string(),
                          fmt::format("is {} x {} pixels, the picture {} x {}: must have its size", pixels.gray.cols,
                                      pixels.gray.rows, size.width, size.height));
-    return measure_orientation(pixels.gray, find_blank(pixels.gray, pixels.bgr) == 0, scale);
+    return measure_orientation(pixels.gray, blank_of(pixels) == 0, scale);
 }
 
 /// Directions away from the pith, as told or as they fit it best.
@@ -344,7 +354,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     specimen.rows = pixels.gray.rows;
     specimen.source = image.string();
     specimen.pixel = pixel_of(image, options, result.notes);
-    View view{pixels.gray, pixels.bgr, find_blank(pixels.gray, pixels.bgr)};
+    View view{pixels.gray, pixels.bgr, blank_of(pixels)};
     if (latewood_is_bright(options)) {
         view.gray = 1.0 - view.gray;
         result.notes.push_back("LW is the brighter wood, as told by --density or --gray");
@@ -377,6 +387,13 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     if (options.fit_pith || options.pith) turn_from_pith(second.orientation, pixels.gray.size(), options, result.notes);
     else if (options.direction.empty()) turn_to_borders(second.orientation, second.borders, frame, width);
     fill_maps(specimen, second, classes, frame);
+    if (const auto share = static_cast<double>(std::ranges::count(specimen.label, Specimen::void_label)) /
+                           static_cast<double>(specimen.label.size());
+        share > most_void)
+        result.notes.push_back(
+            fmt::format("{:.0f} % of the picture is void: taken for ground, cracks, or grays of no class; look at "
+                        "the preview",
+                        100 * share));
     if (options.density) fill_density(specimen, image, *options.density, result.notes);
     for (std::size_t i = 0; i < second.borders.size(); ++i)
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
