@@ -148,15 +148,20 @@ cv::Mat extreme_colour(const cv::Mat& gray, const cv::Mat& bgr, bool brightest) 
                      : cv::min(channel[0], cv::min(channel[1], channel[2]));
 }
 
-/// Patches of `plain` that reach in from a corner.
+/// Patches of `plain` that hold a corner of the picture, or nearly. (An arc of a ring reaches two of its sides, too.)
 cv::Mat pick_from_corners(const cv::Mat& plain) {
-    const cv::Size size = plain.size();
-    return pick(plain, [&](const int* box) {
-        const bool left = box[cv::CC_STAT_LEFT] <= 4, top = box[cv::CC_STAT_TOP] <= 4;
-        const bool right = box[cv::CC_STAT_LEFT] + box[cv::CC_STAT_WIDTH] >= size.width - 4;
-        const bool bottom = box[cv::CC_STAT_TOP] + box[cv::CC_STAT_HEIGHT] >= size.height - 4;
-        return (left || right) && (top || bottom) && box[cv::CC_STAT_AREA] > least_blank * static_cast<double>(size.area());
-    });
+    constexpr int near = 5;  // pixels
+    const auto least = static_cast<int>(least_blank * static_cast<double>(plain.total()));
+    std::vector<std::uint8_t> large{0}, chosen;
+    const cv::Mat patches = for_patches(plain, [&](int, const int* box) { large.push_back(box[cv::CC_STAT_AREA] > least); });
+    chosen.assign(large.size(), 0);
+    for (const int x : {0, plain.cols - near})
+        for (const int y : {0, plain.rows - near}) {
+            const cv::Mat corner = patches(cv::Rect(x, y, near, near));
+            for (auto patch = corner.begin<int>(); patch != corner.end<int>(); ++patch)
+                chosen[static_cast<std::size_t>(*patch)] = large[static_cast<std::size_t>(*patch)];
+        }
+    return chosen_patches(patches, chosen);
 }
 
 /// Whether gray is another beyond at least this share of a patch's rim; light that fades has no rim.
