@@ -148,6 +148,17 @@ void BorderLine::move(double distance, int rows) {
     }
 }
 
+double mean_distance(const BorderLine& inner, const BorderLine& outer) {
+    double sum = 0;
+    int count = 0;
+    for (int u = std::max(inner.first, outer.first); u < std::min(inner.end(), outer.end()); ++u)
+        if (inner.covers(u) && outer.covers(u)) {
+            sum += outer.at(u) - inner.at(u);
+            ++count;
+        }
+    return sum / std::max(count, 1);
+}
+
 std::vector<BorderLine> lay_borders(const StraightWood& wood, const cv::Mat& valid, const cv::Mat& blank,
                                     const RingCoordinate& rings, const std::vector<BorderGuess>& guesses) {
     std::vector<float> rooms;

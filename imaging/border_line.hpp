@@ -23,6 +23,9 @@ struct BorderLine {
     void move(double distance, int rows);
 };
 
+/// With the growth, over the columns that both cover; 0 for none [pixels].
+double mean_distance(const BorderLine& inner, const BorderLine& outer);
+
 /// About where a border runs.
 struct BorderGuess {
     std::vector<double> row;  // of the straightened picture, one a column

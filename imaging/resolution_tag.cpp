@@ -1,11 +1,11 @@
 #include "imaging/resolution_tag.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
 #include <fstream>
-#include <optional>
 #include <sstream>
-#include <string>
 #include <string_view>
 
 namespace crampfit {
@@ -34,33 +34,34 @@ class Bytes {
     std::string bytes_;
 };
 
-double pixel(double x_per_metre, double y_per_metre) {
-    const bool square = x_per_metre > 0 && std::abs(y_per_metre / x_per_metre - 1) < 1e-3;
-    return square ? 1 / x_per_metre : 0;
+std::optional<PixelTag> pixel(double x_per_metre, double y_per_metre) {
+    if (!(x_per_metre > 0 && y_per_metre > 0)) return std::nullopt;
+    return PixelTag{1 / x_per_metre, 1 / y_per_metre};
 }
 
 /// PNG specification (ISO/IEC 15948), 11.3.5.3.
-double png(const Bytes& bytes) {
+std::optional<PixelTag> png(const Bytes& bytes) {
     for (std::size_t at = 8; at + 12 <= bytes.size(); at += 12 + bytes.number(at, 4)) {
         const std::string_view type = bytes.text(at + 4, 4);
-        if (type == "pHYs") return bytes.number(at + 16, 1) == 1 ? pixel(bytes.number(at + 8, 4), bytes.number(at + 12, 4)) : 0;
-        if (type == "IDAT") return 0;
+        if (type == "pHYs" && bytes.number(at + 16, 1) == 1) return pixel(bytes.number(at + 8, 4), bytes.number(at + 12, 4));
+        if (type == "pHYs" || type == "IDAT") break;
     }
-    return 0;
+    return std::nullopt;
 }
 
 /// Dots an inch or a centimetre to dots a metre.
 double per_metre(double value, bool inch) { return inch ? value / 0.0254 : value * 100; }
 
 /// JFIF 1.02: the APP0 segment right after the start of the image.
-double jpeg(const Bytes& bytes) {
+std::optional<PixelTag> jpeg(const Bytes& bytes) {
     const std::uint32_t unit = bytes.number(13, 1);
-    if (bytes.number(2, 2) != 0xffe0 || bytes.text(6, 5) != std::string_view("JFIF\0", 5) || unit < 1 || unit > 2) return 0;
+    if (bytes.number(2, 2) != 0xffe0 || bytes.text(6, 5) != std::string_view("JFIF\0", 5) || unit < 1 || unit > 2)
+        return std::nullopt;
     return pixel(per_metre(bytes.number(14, 2), unit == 1), per_metre(bytes.number(16, 2), unit == 1));
 }
 
 /// TIFF 6.0: tags 282 and 283 are fractions, 296 is their unit (2: inch, the default; 3: centimetre).
-double tiff(Bytes bytes) {
+std::optional<PixelTag> tiff(Bytes bytes) {
     bytes.big_endian = bytes.text(0, 2) == "MM";
     const std::size_t directory = bytes.number(4, 4);
     const std::uint32_t entries = bytes.number(directory, 2);
@@ -87,12 +88,17 @@ double tiff(Bytes bytes) {
             break;
         }
     }
-    return unit == 2 || unit == 3 ? pixel(per_metre(x, unit == 2), per_metre(y, unit == 2)) : 0;
+    if (unit != 2 && unit != 3) return std::nullopt;
+    return pixel(per_metre(x, unit == 2), per_metre(y, unit == 2));
 }
 
 }  // namespace
 
-double pixel_by_tag(const std::filesystem::path& image) {
+bool PixelTag::square() const { return std::abs(width / height - 1) < 1e-3; }
+
+std::string PixelTag::dots() const { return fmt::format("{:.6g} x {:.6g} dpi", 0.0254 / width, 0.0254 / height); }
+
+std::optional<PixelTag> pixel_by_tag(const std::filesystem::path& image) {
     std::ifstream in(image, std::ios::binary);
     std::ostringstream text;
     text << in.rdbuf();
@@ -105,7 +111,7 @@ double pixel_by_tag(const std::filesystem::path& image) {
         bytes.big_endian = false;
         return pixel(bytes.number(38, 4), bytes.number(42, 4));
     }
-    return 0;
+    return std::nullopt;
 }
 
 }  // namespace crampfit

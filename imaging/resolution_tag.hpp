@@ -1,11 +1,21 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 
 namespace crampfit {
 
-/// Edge of a pixel by the resolution that the file states [m]: PNG's pHYs, BMP's header, JPEG's JFIF segment, TIFF's
-/// XResolution with a unit. 0 where there is none, or different ones for x and y.
-double pixel_by_tag(const std::filesystem::path& image);
+/// A pixel as a file states it.
+struct PixelTag {
+    double width = 0, height = 0;  // [m]
+
+    bool square() const;
+    /// In the usual unit, as in "1200 x 1200 dpi".
+    std::string dots() const;
+};
+
+/// By PNG's pHYs, BMP's header, JPEG's JFIF segment or TIFF's XResolution with a unit; none where there is none.
+std::optional<PixelTag> pixel_by_tag(const std::filesystem::path& image);
 
 }  // namespace crampfit

@@ -10,15 +10,58 @@ namespace {
 
 constexpr int vertex_spacing = 5;  // columns
 
-bool both_cover(const BorderLine& inner, const BorderLine& outer, int u) { return inner.covers(u) && outer.covers(u); }
-
-/// How steep both borders of a ring are on average about a column.
+/// How steep both borders of a ring are on average about a column; of one border, its slope.
 double slope(const BorderLine& inner, const BorderLine& outer, int u, int reach) {
+    const auto both_cover = [&](int k) { return inner.covers(k) && outer.covers(k); };
     int a = u, b = u;
-    while (a > u - reach && both_cover(inner, outer, a - 1)) --a;
-    while (b < u + reach && both_cover(inner, outer, b + 1)) ++b;
+    while (a > u - reach && both_cover(a - 1)) --a;
+    while (b < u + reach && both_cover(b + 1)) ++b;
     return b > a ? 0.5 * (inner.at(b) - inner.at(a) + outer.at(b) - outer.at(a)) / (b - a) : 0;
 }
+
+/// Mean over the columns that both borders cover; 0 for none.
+double mean_width(const BorderLine& inner, const BorderLine& outer) {
+    double sum = 0;
+    int columns = 0;
+    for (int u = std::max(inner.first, outer.first); u < std::min(inner.end(), outer.end()); ++u) {
+        if (!inner.covers(u) || !outer.covers(u)) continue;
+        const double along_growth = outer.at(u) - inner.at(u);
+        sum += along_growth / std::hypot(1, slope(inner, outer, u, std::max(2, static_cast<int>(along_growth / 2))));
+        ++columns;
+    }
+    return sum / std::max(columns, 1);
+}
+
+/// What a straight line outward from a ring's inner border, at a right angle to it, passes through up to the outer one.
+struct RadialLine {
+    double weight = 0;          // length of the inner border that it stands for [pixels]; 0: leaves what is seen of the ring
+    double wood = 0, late = 0;  // places on it
+
+    /// `reach` [pixels] of the inner border tells the line's direction.
+    RadialLine(const BorderLine& inner, const BorderLine& outer, int u, int reach, const cv::Mat& classes, int latewood,
+               const cv::Mat& features) {
+        constexpr double step = 0.25;  // pixels
+        const double steep = slope(inner, inner, u, reach), stretch = std::hypot(1, steep);
+        for (double along = 0.5 * step;; along += step) {
+            const int column = static_cast<int>(std::lround(u - along * steep / stretch));
+            const double v = inner.at(u) + along / stretch;
+            if (!outer.covers(column) || v > classes.rows) return;
+            if (v > outer.at(column)) {
+                weight = stretch;
+                return;
+            }
+            // Its own pixel, not the one of the next ring that the border runs through.
+            const int first = inner.covers(column) ? static_cast<int>(std::floor(inner.at(column))) + 1 : 0;
+            const int last = static_cast<int>(std::floor(outer.at(column)));
+            if (first > last) continue;
+            const int row = std::clamp(static_cast<int>(std::lround(v)), first, last);
+            // Rays, cracks and marks hide wood whose class is that of the ring around, and more of the LW than of the EW.
+            if (features.at<std::uint8_t>(row, column) == static_cast<int>(Feature::background)) continue;
+            ++wood;
+            late += classes.at<std::uint8_t>(row, column) == latewood;
+        }
+    }
+};
 
 }  // namespace
 
@@ -59,26 +102,15 @@ std::vector<RingFigures> ring_figures(const std::vector<BorderLine>& borders, co
     std::vector<RingFigures> rings;
     for (std::size_t i = 1; i < borders.size(); ++i) {
         const BorderLine &inner = borders[i - 1], &outer = borders[i];
-        const int from = std::max(inner.first, outer.first), to = std::min(inner.end(), outer.end());
-        double width = 0;
-        long columns = 0, late = 0, wood = 0;
-        for (int u = from; u < to; ++u) {
-            if (!both_cover(inner, outer, u)) continue;
-            ++columns;
-            const double along_growth = outer.at(u) - inner.at(u);
-            const double steep = slope(inner, outer, u, std::max(2, static_cast<int>(along_growth / 2)));
-            width += along_growth / std::sqrt(1 + steep * steep);
-            for (int v = static_cast<int>(std::floor(inner.at(u))) + 1; v <= outer.at(u); ++v) {
-                if (features.at<std::uint8_t>(v, u) == static_cast<int>(Feature::background))
-                    continue;  // rays, cracks and marks hide wood whose class is that of the ring around, and more of the LW than
-                               // of the EW
-                ++wood;
-                late += classes.at<std::uint8_t>(v, u) == latewood;
-            }
+        const int reach = std::max(2, static_cast<int>(0.5 * mean_distance(inner, outer)));  // waves and noise are shorter
+        double wood = 0, late = 0;
+        for (int u = inner.first; u < inner.end(); ++u) {
+            if (!inner.covers(u)) continue;
+            const RadialLine line(inner, outer, u, reach, classes, latewood, features);
+            wood += line.weight * line.wood;
+            late += line.weight * line.late;
         }
-        if (wood > 0)
-            rings.push_back({static_cast<std::int64_t>(i) + 1, width / static_cast<double>(columns),
-                             static_cast<double>(late) / static_cast<double>(wood)});
+        if (wood > 0) rings.push_back({static_cast<std::int64_t>(i) + 1, mean_width(inner, outer), late / wood});
     }
     return rings;
 }

@@ -14,8 +14,10 @@ BorderPolyline polyline_of(const BorderLine& line, std::int64_t ring, const Grow
 /// picture or has no extent along the rings.
 BorderLine line_of(const BorderPolyline& polyline, const GrowthFrame& frame);
 
-/// Widths and LW fractions of the rings between neighbouring borders, from where both are. `classes` and `features` are
-/// in the frame; `latewood` is LW's class.
+/// Widths and LW fractions of the rings between neighbouring borders. Widths are means over the columns where both are; LW
+/// fractions are of straight lines from the inner border, at right angles to it, that reach the outer one within what is seen of
+/// the ring. (Where a ring is cut off askew, as by the picture's side, areas have too little of the LW or of the EW.) `classes`
+/// and `features` are in the frame; `latewood` is LW's class.
 std::vector<RingFigures> ring_figures(const std::vector<BorderLine>& borders, const cv::Mat& classes, int latewood,
                                       const cv::Mat& features);
 

@@ -29,7 +29,8 @@ constexpr int least_side = 16;                // pixels
 constexpr std::size_t most_pixels = 1 << 26;  // some hundred bytes are needed for each
 
 constexpr double brightest_share = 0.999;  // of the pixels are no brighter than what counts as brightest: glints and hot pixels
-constexpr double most_void = 0.5;          // of the picture: more is worth a warning
+constexpr double least_ring = 15, least_latewood = 4;  // pixels; narrower, and LW fractions are off by more than 2 %
+constexpr double most_void = 0.5;                      // of the picture: more is worth a warning
 
 /// Gray and colour as float, the brightest value 1, but for a few pixels.
 struct Pixels {
@@ -61,6 +62,20 @@ Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
 
 /// 255 where no specimen is photographed.
 cv::Mat blank_of(const Pixels& pixels) { return find_blank(pixels.gray, pixels.bgr) | find_ground(pixels.gray); }
+
+/// Says where rings are too narrow for their LW fractions.
+void warn_of_narrow(const std::vector<RingFigures>& rings, std::vector<std::string>& notes) {
+    std::vector<float> widths, late;
+    for (const RingFigures& ring : rings) {
+        widths.push_back(static_cast<float>(ring.width));
+        late.push_back(static_cast<float>(ring.width * ring.latewood_fraction));
+    }
+    const double width = quantile(widths, 0.5), late_width = quantile(late, 0.5);
+    if (!rings.empty() && (width < least_ring || late_width < least_latewood))
+        notes.push_back(fmt::format("rings are {:.1f} pixels wide and their LW {:.1f}, typically: LW fractions need {:.0f} and "
+                                    "{:.0f}, take a finer picture",
+                                    width, late_width, least_ring, least_latewood));
+}
 
 /// Everything found in one round.
 struct Round {
@@ -99,9 +114,28 @@ std::string obstacle(const OrientationField& field) {
     return "";
 }
 
+/// Throws InputError for two that cross or touch.
+void refuse_crossing(const std::vector<BorderPolyline>& borders, const std::vector<BorderLine>& lines, const GrowthFrame& frame) {
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        for (std::size_t j = i + 1; j < lines.size(); ++j) {
+            bool above = false, below = false;
+            for (int u = std::max(lines[i].first, lines[j].first); u < std::min(lines[i].end(), lines[j].end()); ++u) {
+                const double apart = lines[j].at(u) - lines[i].at(u);
+                above = above || apart >= 0;
+                below = below || apart <= 0;
+                if (!above || !below) continue;
+                const cv::Point2d at = frame.to_picture({static_cast<double>(u), lines[i].at(u)});
+                throw InputError("--borders", "ring", std::to_string(borders[j].ring),
+                                 fmt::format("meets the border of ring {} at {:.0f},{:.0f} px: borders must not cross",
+                                             borders[i].ring, at.x, at.y));
+            }
+        }
+}
+
 std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, const GrowthFrame& frame) {
     std::vector<BorderLine> lines;
     for (const BorderPolyline& border : borders) lines.push_back(line_of(border, frame));
+    refuse_crossing(borders, lines, frame);
     std::sort(lines.begin(), lines.end(), [](const BorderLine& a, const BorderLine& b) {
         const int middle = (std::max(a.first, b.first) + std::min(a.end(), b.end())) / 2;
         const auto at = [middle](const BorderLine& line) { return line.at(std::clamp(middle, line.first, line.end() - 1)); };
@@ -215,14 +249,20 @@ OrientationField orientation_in(const cv::Mat& gray, const cv::Mat& valid, const
 }
 
 double pixel_of(const std::filesystem::path& image, const SegmentOptions& options, std::vector<std::string>& notes) {
+    const std::optional<PixelTag> tag = pixel_by_tag(image);
     if (options.pixel > 0) {
         notes.push_back(fmt::format("scale: {:.6g} um a pixel, from {}", 1e6 * options.pixel, options.pixel_from));
+        if (tag && !tag->square())
+            notes.push_back("the file's resolution tag, " + tag->dots() + ", is of oblong pixels: taken as square, as told");
         return options.pixel;
     }
-    if (const double tagged = pixel_by_tag(image); tagged > 0) {
+    if (tag && !tag->square())
+        throw InputError(image.string(), "resolution tag", tag->dots(),
+                         "pixels must be square: resample the picture, or give --pixel if the tag is wrong");
+    if (tag) {
         notes.push_back(fmt::format("scale: {:.6g} um a pixel ({:.6g} dpi), from the file's resolution tag; check it",
-                                    1e6 * tagged, 0.0254 / tagged));
-        return tagged;
+                                    1e6 * tag->width, 0.0254 / tag->width));
+        return tag->width;
     }
     notes.push_back("scale: not known (no --pixel, no resolution tag); widths in mm are nan and no scene can use the specimen");
     return 0;
@@ -402,6 +442,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
                                        specimen.borders.size(), options.borders.empty() ? "" : " as given", specimen.rings.size(),
                                        second.ring_width));
+    warn_of_narrow(specimen.rings, result.notes);
     return result;
 }
 

@@ -34,18 +34,6 @@ cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, doubl
     return rings.bend(smooth);
 }
 
-/// Over the columns that both cover; 0 for none.
-double mean_distance(const BorderLine& inner, const BorderLine& outer, int from, int to) {
-    double sum = 0;
-    int count = 0;
-    for (int u = from; u < to; ++u)
-        if (inner.covers(u) && outer.covers(u)) {
-            sum += outer.at(u) - inner.at(u);
-            ++count;
-        }
-    return sum / std::max(count, 1);
-}
-
 /// Levels of one ring at some columns, a stretch of ring apart.
 class RingLevels {
   public:
@@ -57,7 +45,7 @@ class RingLevels {
         const int count = std::max(1, (to - from) / stretch), step = std::max(1, stretch / 50);  // enough of broad rings
         std::vector<RingProfile> profiles;
         BorderGrays at_inner, at_outer;  // sums over the stretches
-        const double width = mean_distance(inner, outer, from, to);
+        const double width = mean_distance(inner, outer);
         int edges_seen = 0;
         for (int k = 0; k < count; ++k) {
             const int begin = from + (to - from) * k / count, end = from + (to - from) * (k + 1) / count;

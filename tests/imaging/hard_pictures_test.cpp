@@ -1,5 +1,6 @@
 // Drawn rings in pictures that are hard to read: coloured light, grounds, cracks, hot pixels, no rings at all. Which pixel is
 // what is known from the drawing.
+#include "datasets/error.hpp"
 #include "imaging/segment.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -68,6 +69,10 @@ double void_share(const Specimen& specimen, const Where& where) {
                 voids += specimen.label[static_cast<std::size_t>(y) * specimen.columns + x] == Specimen::void_label;
             }
     return voids / all;
+}
+
+bool noted(const Segmentation& result, const std::string& phrase) {
+    return std::ranges::any_of(result.notes, [&](const std::string& note) { return note.find(phrase) != std::string::npos; });
 }
 
 const cv::Size size(600, 500);
@@ -145,6 +150,21 @@ TEST(VerificationHardPictures, FallingLightIsNoGround) {
             << noise;
 }
 
+// Three corners in EW, little noise, and arcs of rings that reach two sides each: no ground.
+TEST(VerificationHardPictures, ArcsAreNoGround) {
+    for (const double noise : {0.0, 1.0, 3.0}) {
+        cv::Mat gray(size, CV_32F);
+        for (int y = 0; y < size.height; ++y)
+            for (int x = 0; x < size.width; ++x) {
+                const double turns = std::hypot(x + 60, y + 60) / 58 + 0.5;
+                gray.at<float>(y, x) = turns - std::floor(turns) > 0.75 ? 90 : 190;
+            }
+        const Specimen specimen = segment_pixels(with_noise(gray, noise)).specimen;
+        EXPECT_LT(void_share(specimen, [](double, double) { return true; }), 0.001) << noise;
+        EXPECT_GE(specimen.borders.size(), 11u) << noise;
+    }
+}
+
 // Cracks across the rings, right through the picture, and along them, of any width; wood beside them stays wood and every ring's
 // LW fraction is within 2 % of what was drawn.
 TEST(VerificationHardPictures, CracksOfAnyWidthAndWay) {
@@ -205,4 +225,74 @@ TEST(VerificationHardPictures, AHotPixelSetsNoScale) {
     std::size_t differ = 0;
     for (std::size_t i = 0; i < specimen.label.size(); ++i) differ += specimen.label[i] != expected.label[i];
     EXPECT_LT(differ, 50u);  // about the pixel
+}
+
+// Rings about a pith at the picture's corner are cut off by its sides askew; along each radius LW is a quarter of a ring. Bar of
+// the LW fraction.
+TEST(VerificationHardPictures, LatewoodOfStronglyCurvedRings) {
+    for (const cv::Point2d& pith : {cv::Point2d(-60, -60), {300, -80}}) {
+        cv::Mat gray(size, CV_32F);
+        for (int y = 0; y < size.height; ++y)
+            for (int x = 0; x < size.width; ++x) {
+                int dark = 0;
+                for (int i = 0; i < 16; ++i) {
+                    const double turns = std::hypot(x + (i % 4 - 1.5) / 4 - pith.x, y + (i / 4 - 1.5) / 4 - pith.y) / 58;
+                    dark += turns - std::floor(turns) > 0.75;
+                }
+                gray.at<float>(y, x) = static_cast<float>(190 - 100 * dark / 16);
+            }
+        const Specimen specimen = segment_pixels(with_noise(gray, 3)).specimen;
+        EXPECT_GE(specimen.rings.size(), 7u);
+        double mean = 0;
+        for (const RingFigures& ring : specimen.rings) {
+            mean += ring.latewood_fraction / static_cast<double>(specimen.rings.size());
+            EXPECT_NEAR(ring.latewood_fraction, 0.25, 0.02) << ring.ring;
+        }
+        EXPECT_NEAR(mean, 0.25, 0.003) << pith;  // a fifth of what noise leaves of one ring's
+    }
+}
+
+// Nobody should take the LW fraction of rings that are but a few pixels wide without a word.
+TEST(UnitHardPictures, NarrowRingsAreTold) {
+    const auto told = [](double period) {
+        const DrawnWood rings{.period = period};
+        return noted(segment_pixels(with_noise(rings.drawn({300, 200}), 4), {.growth = GrowthAxis::right}), "LW fractions need");
+    };
+    EXPECT_TRUE(told(8));
+    EXPECT_FALSE(told(40));
+}
+
+TEST(UnitHardPictures, CrossingBordersAreRefused) {
+    const cv::Mat pixels = with_noise(DrawnWood{}.drawn(size), 4);
+    SegmentOptions options{.growth = GrowthAxis::right};
+    options.borders = {{1, {{100, 0}, {200, 499}}}, {2, {{200, 0}, {100, 499}}}, {3, {{300, 0}, {300, 499}}}};
+    try {
+        segment_pixels(pixels, options);
+        ADD_FAILURE() << "borders that cross were taken";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.file, "--borders");
+        EXPECT_EQ(error.value, "2");
+        EXPECT_NE(error.rule.find("ring 1 at 150,250"), std::string::npos) << error.rule;
+    }
+    options.borders.erase(options.borders.begin());
+    EXPECT_EQ(segment_pixels(pixels, options).specimen.rings.size(), 1u);
+}
+
+TEST(UnitHardPictures, OblongResolutionTagsAreRefused) {
+    const TemporaryFolder folder;
+    const auto file = folder / "a.tiff";
+    ASSERT_TRUE(cv::imwrite(file.string(), with_noise(DrawnWood{}.drawn({200, 150}), 4),
+                            {cv::IMWRITE_TIFF_XDPI, 1016, cv::IMWRITE_TIFF_YDPI, 508, cv::IMWRITE_TIFF_RESUNIT, 2}));
+    try {
+        segment(file, {});
+        ADD_FAILURE() << "oblong pixels were taken";
+    } catch (const InputError& error) {
+        EXPECT_EQ(error.file, file.string());
+        EXPECT_EQ(error.key, "resolution tag");
+        EXPECT_EQ(error.value, "1016 x 508 dpi");
+        EXPECT_NE(error.rule.find("--pixel"), std::string::npos);
+    }
+    const Segmentation told = segment(file, {.pixel = 25e-6});
+    EXPECT_EQ(told.specimen.pixel, 25e-6);
+    EXPECT_TRUE(noted(told, "oblong"));
 }
