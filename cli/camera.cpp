@@ -138,10 +138,11 @@ ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
         ++done;
         line.show(static_cast<double>(done) / count, done, "");
     });
+    // Minus nothing plus nothing is nothing, without the sign.
     report(common,
            fmt::format(
                "{} pictures beside reference.png in {}; the lower left corner lies at [\"{:g} mm\", \"{:g} mm\"] of the specimen",
-               done.load(), folder.string(), 1e3 * camera.view().corner.x(), 1e3 * camera.view().corner.y()));
+               done.load(), folder.string(), 1e3 * camera.view().corner.x() + 0.0, 1e3 * camera.view().corner.y() + 0.0));
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 
@@ -178,7 +179,9 @@ Verb camera_verb(CLI::App& command, const CommonOptions& common) {
     verb->add_option("--contrast", options.contrast, "Standard deviation of the pattern's gray, of 255")
         ->capture_default_str()
         ->excludes(wood);
-    verb->add_option("--seed", options.seed, "Of the pattern and the noise")->capture_default_str();
+    verb->add_option("--seed", options.seed, "Of the pattern and the noise")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
     return {verb, [arguments, &common] { return photograph(*arguments, common); }};
 }
 

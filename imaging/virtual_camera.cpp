@@ -37,16 +37,18 @@ std::optional<Vec2> origin_of(const Vec2& seen, const PlaneDisplacement& displac
 
 void VirtualCameraOptions::validate() const {
     const auto require = [](bool holds, const char* option, double value, const char* rule) {
-        if (!holds) throw InputError("virtual camera", option, fmt::format("{}", value), rule);
+        const std::string name = option;
+        if (!holds)
+            throw InputError(name.starts_with("--") ? "command line" : "virtual camera", name, fmt::format("{}", value), rule);
     };
     require(columns > 0 && columns <= 16384, "columns", columns, "must be from 1 to 16384");
     require(rows > 0 && rows <= 16384, "rows", rows, "must be from 1 to 16384");
-    require(spot_radius >= 0.5 && spot_radius <= 100, "spot_radius", spot_radius, "must be from 0.5 to 100 pixels");
+    require(spot_radius >= 0.5 && spot_radius <= 100, "--spot", spot_radius, "must be from 0.5 to 100 pixels");
     require(mean >= 0 && mean <= 255, "mean", mean, "must be from 0 to 255");
-    require(contrast > 0 && contrast <= 255, "contrast", contrast, "must be above 0, and 255 at most");
-    require(noise >= 0 && noise <= 255, "noise", noise, "must be from 0 to 255");
+    require(contrast > 0 && contrast <= 255, "--contrast", contrast, "must be above 0, and 255 at most");
+    require(noise >= 0 && noise <= 255, "--noise", noise, "must be from 0 to 255");
     require(gap_gray >= 0 && gap_gray <= 255, "gap_gray", gap_gray, "must be from 0 to 255");
-    require(blur >= 0 && blur <= 20, "blur", blur, "must be from 0 to 20 pixels");
+    require(blur >= 0 && blur <= 20, "--blur", blur, "must be from 0 to 20 pixels");
     require(samples >= 1 && samples <= 10, "samples", samples, "must be from 1 to 10");
 }
 
