@@ -37,9 +37,9 @@ void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string
     verb.add_option("--subset", options.subset, "Edge of a subset in pixels, odd")->capture_default_str();
     verb.add_option("--step", options.step, "Pixels between points")->capture_default_str();
     verb.add_option("--order", options.order, "Of the warp within a subset: 1 or 2")->capture_default_str();
-    verb.add_option("--smoothing", options.smoothing,
-                    "Radius in pixels of the Gaussian that smooths the reference's slopes, 0 for none")
-        ->capture_default_str();
+    verb.add_option(
+        "--smoothing", options.smoothing,
+        "Radius in pixels of the Gaussian that smooths the reference's slopes, 0 for none; if left out, by its pattern");
     verb.add_option("--mask", series.mask, "Picture of the reference's size, black where nothing is to be followed")
         ->type_name("M.png");
 }

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -26,6 +27,8 @@ struct Arguments {
 
 // Of a subset: a tip whose place displacements tell no better is looked for as a dark line, too.
 constexpr double well_known = 0.2;
+constexpr double agree = 3;           // standard errors between two places of one tip
+constexpr double least_apart = 0.25;  // of the sides of a dark line that is a crack, half of what it needs to be seen [px]
 
 /// The tip by the displacement field, by the picture's gray, or by the gray where the field does not show it well.
 class TipFinder {
@@ -38,21 +41,35 @@ class TipFinder {
     }
 
     CrackTip operator()(const FinePicture& image) {
-        CrackTip tip;
-        if (by_fields_) tip = find_crack_tip(geometry_, correlator_.field(image));
-        const bool found = tip.status == TipStatus::ok;
-        if (!gray_ || (found && tip.sigma < well_known * geometry_.subset)) return tip;
+        if (!by_fields_) return counted(gray_->tip(image));
+        const DisplacementField field = correlator_.field(image);
+        const CrackTip tip = find_crack_tip(geometry_, field);
+        if (!gray_ || (tip.status == TipStatus::ok && tip.sigma < well_known * geometry_.subset)) return tip;
         const CrackTip by_gray = gray_->tip(image);
-        const bool seen =
-            (by_gray.status == TipStatus::ok && !(found && tip.sigma < by_gray.sigma)) || by_gray.status == TipStatus::outside;
-        from_gray_ += seen;
-        return seen || !by_fields_ || tip.status == TipStatus::too_few_points ? by_gray : tip;
+        return prefer_gray(tip, by_gray, field) ? counted(by_gray) : tip;
     }
 
     int from_gray() const { return from_gray_; }
     const FieldGeometry& geometry() const { return geometry_; }
 
   private:
+    CrackTip counted(const CrackTip& by_gray) {
+        from_gray_ += by_gray.status == TipStatus::ok || by_gray.status == TipStatus::outside;
+        return by_gray;
+    }
+
+    /// Displacements do not show the tip well.
+    bool prefer_gray(const CrackTip& tip, const CrackTip& by_gray, const DisplacementField& field) const {
+        if (tip.status == TipStatus::too_few_points || by_gray.status == TipStatus::outside) return true;
+        if (by_gray.status != TipStatus::ok) return false;
+        // The dark line's end is behind the tip where the crack's opening is too small to be seen: the two must agree.
+        if (tip.status == TipStatus::ok)
+            return by_gray.sigma < tip.sigma && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.sigma, tip.sigma);
+        // A line whose sides lie still is a shadow.
+        const std::optional<double> apart = motion_apart(geometry_, field, by_gray);
+        return !apart || *apart > least_apart;
+    }
+
     Correlator correlator_;
     FieldGeometry geometry_;
     std::optional<GrayTracker> gray_;

@@ -44,8 +44,9 @@ class SubsetSums {
 
 /// Which points cannot be followed in any image, and why; the others are not reached yet.
 std::vector<PointStatus> usable_points(const FinePicture& picture, const std::vector<std::uint8_t>& mask,
-                                       const PointLattice& lattice, int subset) {
-    const cv::Mat gray(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
+                                       const PointLattice& lattice, int subset, double least_deviation) {
+    const cv::Mat all(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
+    const cv::Mat gray = all - cv::mean(all);  // small numbers, whose squares are exact enough
     const SubsetSums sum(gray, subset / 2), squares(gray.mul(gray), subset / 2);
     const cv::Mat inside = mask.empty() ? cv::Mat(gray.size(), CV_8U, cv::Scalar(255))
                                         : cv::Mat(picture.rows, picture.columns, CV_8U, const_cast<std::uint8_t*>(mask.data()));
@@ -80,10 +81,9 @@ FinePicture checked(FinePicture picture, const CorrelateOptions& options, const 
     return picture;
 }
 
-constexpr double most_apart = 0.1;  // root mean square over a subset of motion that its warp does not follow [px]
-
 /// A subset that reaches over a crack matches neither side, and yet may correlate well. It shows in what is left of its
-/// grays: more than noise leaves elsewhere in the picture, and as much as motion by `most_apart` makes of the slopes.
+/// grays, a few pixels left out: more than noise leaves elsewhere in the picture, and more than motion by `most_apart` makes of
+/// the slopes.
 void drop_torn(std::vector<SubsetMatch>& matches) {
     std::vector<double> residuals;
     for (const SubsetMatch& match : matches)
@@ -93,8 +93,8 @@ void drop_torn(std::vector<SubsetMatch>& matches) {
     std::ranges::nth_element(residuals, middle);
     const double noise = *middle;
     for (SubsetMatch& match : matches)
-        if (match.status == PointStatus::ok && match.residual > 2 * noise &&
-            match.residual - noise > most_apart * most_apart * match.slope)
+        if (match.status == PointStatus::ok && match.apart > 2 * noise &&
+            match.apart - noise > most_apart * most_apart * match.slope)
             match.status = PointStatus::moved_apart;
 }
 
@@ -107,15 +107,15 @@ void CorrelateOptions::validate() const {
     if (subset < 5 || subset > 501 || subset % 2 == 0) fail("--subset", subset, "must be an odd number of pixels from 5 to 501");
     if (step < 1 || step > 1000) fail("--step", step, "must be from 1 to 1000 pixels");
     if (order != 1 && order != 2) fail("--order", order, "must be 1 or 2");
-    if (!(smoothing >= 0 && smoothing <= 20))
-        throw InputError("command line", "--smoothing", fmt::format("{}", smoothing), "must be from 0 to 20 pixels");
+    if (smoothing && !(*smoothing >= 0 && *smoothing <= 20))
+        throw InputError("command line", "--smoothing", fmt::format("{}", *smoothing), "must be from 0 to 20 pixels");
 }
 
 Correlator::Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
                        const std::string& name)
     : options_(options), reference_(checked(std::move(reference), options, name), options.smoothing),
       lattice_(lattice_of(reference_.picture, options)),
-      at_start_(usable_points(reference_.picture, mask, lattice_, options.subset)) {}
+      at_start_(usable_points(reference_.picture, mask, lattice_, options.subset, reference_.least_deviation)) {}
 
 void Correlator::check(const FinePicture& image, const std::string& name) const {
     const FinePicture& reference = reference_.picture;

@@ -4,15 +4,18 @@
 #include "imaging/gray_picture.hpp"
 #include "imaging/subset.hpp"
 
+#include <optional>
 #include <vector>
 
 namespace crampfit {
 
 struct CorrelateOptions {
-    int subset = 31;         // edge of a subset, odd [px]
-    int step = 10;           // between points [px]
-    int order = 1;           // of the warp within a subset: 1 or 2
-    double smoothing = 2.5;  // radius of the Gaussian that smooths the reference's slopes, 0 for none (subset.hpp) [px]
+    int subset = 31;  // edge of a subset, odd [px]
+    int step = 10;    // between points [px]
+    int order = 1;    // of the warp within a subset: 1 or 2
+    // Radius of the Gaussian that smooths the reference's slopes, 0 for none; where left out, as its pattern asks for
+    // (subset.hpp) [px].
+    std::optional<double> smoothing = {};
     int threads = 1;
 
     /// Throws InputError naming the option, its value and the rule that it breaks.

@@ -1,5 +1,7 @@
 #include "imaging/crack_tip.hpp"
 
+#include "imaging/subset.hpp"
+
 #include <Eigen/Dense>
 
 #include <algorithm>
@@ -14,20 +16,23 @@
 namespace crampfit {
 namespace {
 
-constexpr int terms = 14;         // of the series, for each component
-constexpr int smooth_terms = 10;  // of a polynomial of third degree
-constexpr double unit = 100;      // length that r is counted in, so that the terms are of like size [px]
-constexpr int scan_points = 500;  // of the field that take part in the coarse search
-constexpr int scan_places = 13;   // along the longer side of the field
-constexpr int scan_angles = 16;   // around the circle
-constexpr int ring_subsets = 6;   // outer radius of the ring about the tip, in subsets
-constexpr int least_points = 60;  // four times the series' coefficients
+constexpr int terms = 14;                // of the series, for each component
+constexpr int smooth_terms = 10;         // of a polynomial of third degree
+constexpr double unit = 100;             // length that r is counted in, so that the terms are of like size [px]
+constexpr int scan_points = 500;         // of the field that take part in the coarse search
+constexpr int scan_places = 13;          // along the longer side of the field
+constexpr int scan_angles = 16;          // around the circle
+constexpr int ring_subsets = 6;          // outer radius of the ring about the tip, in subsets
+constexpr double inner_share = 2.0 / 3;  // of that, of the ring that tells how much the tip depends on it
+constexpr int least_points = 60;         // four times the series' coefficients
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
 constexpr double most_torn = 0.7;      // share of the torn subsets that the crack must have torn
 constexpr std::size_t least_torn = 8;  // of them, beside each other, that say anything
 constexpr double strained = 4.0;  // reach of the strain about the tip that tears a subset, in half widths of one: a judgement
+
+constexpr double torn_behind = 2.0;  // half widths behind the tip, up to which a crack that has opened there must have torn
 
 // Of the search for the tip.
 constexpr int most_iterations = 40;
@@ -169,17 +174,6 @@ std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementFie
     return torn;
 }
 
-/// Whether a crack along the line tears most of the subsets that were torn, or strains them about its tip, up to which some are.
-bool tears(const Line& line, const std::vector<Vec2>& torn, double width) {
-    bool up_to_tip = false;
-    const auto count = std::ranges::count_if(torn, [&](const Vec2& place) {
-        const Vec2 local = line.local(place);
-        up_to_tip = up_to_tip || (std::abs(local.y()) < width && local.x() > -2.0 * width);
-        return (local.x() < width && std::abs(local.y()) < width) || local.norm() < strained * width;
-    });
-    return up_to_tip && static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
-}
-
 /// The motion apart of what lies to either side of a place of the line, which has its origin there; none where nothing does.
 double jump_at(const std::vector<Sample>& samples, const Line& line, int subset) {
     std::array<Vec2, 2> sum{Vec2::Zero(), Vec2::Zero()};
@@ -193,6 +187,34 @@ double jump_at(const std::vector<Sample>& samples, const Line& line, int subset)
         ++count[side];
     }
     return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : 0;
+}
+
+/// The line as it is some way behind its tip [px].
+Line behind(const Line& line, double way) { return {line.tip - way * line.direction(), line.angle}; }
+
+/// A motion apart that tears every subset it goes through [px]. Of a jump j between two parts of a subset, a quarter to a half
+/// and more of it, a warp of first order leaves a root mean square of j / 4. That must be more than `most_apart` and than what
+/// noise leaves, which is about the standard error of a displacement times the root of the number of pixels. Twice as much, as
+/// patterns differ from place to place.
+double tearing_jump(const DisplacementField& field, int subset) {
+    std::vector<double> sigma;
+    for (std::size_t i = 0; i < field.status.size(); ++i)
+        if (field.status[i] == PointStatus::ok) sigma.push_back(field.sigma[i]);
+    const auto middle = sigma.begin() + static_cast<std::ptrdiff_t>(sigma.size() / 2);
+    std::ranges::nth_element(sigma, middle);
+    return 2 * 4 * std::max(most_apart, subset * *middle);
+}
+
+/// Whether a crack along the line tears most of the subsets that were torn, or strains them about its tip. They must reach up to
+/// the tip if `opens_there`: if its faces have moved apart so near to it that no subset between them can be whole.
+bool tears(const Line& line, const std::vector<Vec2>& torn, double width, bool opens_there) {
+    bool up_to_tip = !opens_there;
+    const auto count = std::ranges::count_if(torn, [&](const Vec2& place) {
+        const Vec2 local = line.local(place);
+        up_to_tip = up_to_tip || (std::abs(local.y()) < width && local.x() > -torn_behind * width);
+        return (local.x() < width && std::abs(local.y()) < width) || local.norm() < strained * width;
+    });
+    return up_to_tip && static_cast<double>(count) >= most_torn * static_cast<double>(torn.size());
 }
 
 /// The line through the torn subsets, pointing from where the sides have moved apart more. The last of them reaches over the tip
@@ -220,6 +242,18 @@ std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<
     const Vec2 extent = lattice.step * Vec2(lattice.columns - 1, lattice.rows - 1);
     if (beyond.minCoeff() < 0 || (extent - beyond).minCoeff() < 0) return std::nullopt;
     return Line{middle + (last - 0.25 * geometry.subset) * along, std::atan2(along.y(), along.x())};
+}
+
+/// How far the tip may be from the end of the torn subsets. Near a tip the square of the motion apart grows with the distance
+/// (Williams 1957): the line that it lies on at a subset behind the end and farther back says where it begins, which is right in
+/// even wood only.
+double end_error(const std::vector<Sample>& samples, const Line& line, int subset) {
+    const double near = jump_at(samples, behind(line, subset), subset);
+    for (const int way : {3, 2, 1}) {
+        const double far = jump_at(samples, behind(line, (1 + way) * subset), subset);
+        if (far > near) return std::clamp(std::abs(way * near * near / (far * far - near * near) - 1), 0.25, 3.0) * subset;
+    }
+    return 3.0 * subset;
 }
 
 /// The best of a coarse grid of tips and directions.
@@ -326,14 +360,28 @@ double length_in_picture(const Line& line, int columns, int rows) {
     return length;
 }
 
-}  // namespace
-
-CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field) {
-    const PointLattice& lattice = geometry.lattice;
+std::vector<Sample> followed(const PointLattice& lattice, const DisplacementField& field) {
     std::vector<Sample> samples;
     for (int point = 0; point < lattice.count(); ++point)
         if (const auto i = static_cast<std::size_t>(point); field.status[i] == PointStatus::ok)
             samples.push_back({Vec2(lattice.x(point), lattice.y(point)), Vec2(field.u[i], field.v[i])});
+    return samples;
+}
+
+}  // namespace
+
+std::optional<double> motion_apart(const FieldGeometry& geometry, const DisplacementField& field, const CrackTip& crack) {
+    const std::vector<Sample> samples = followed(geometry.lattice, field);
+    const Line line{crack.tip, crack.angle};
+    double most = 0;
+    for (double way = geometry.subset; way < crack.length; way += geometry.subset)
+        most = std::max(most, jump_at(samples, behind(line, way), geometry.subset));
+    return most > 0 ? std::optional(most) : std::nullopt;
+}
+
+CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field) {
+    const PointLattice& lattice = geometry.lattice;
+    const std::vector<Sample> samples = followed(lattice, field);
     CrackTip found;
     found.status = TipStatus::too_few_points;
     if (static_cast<int>(samples.size()) < 2 * least_points) return found;
@@ -352,9 +400,17 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         if (static_cast<int>(clear.size()) < least_points) return found;
         covariance = refine(clear, line);
     }
+    // Torn subsets without a motion apart are shadows, dust and the like.
+    if (!(gain(clear_of(samples, line, geometry.subset), line) > least_gain)) {
+        found.status = TipStatus::no_crack;
+        return found;
+    }
     // In wood whose rings differ much in stiffness the series may fit better elsewhere than at the crack.
     const std::vector<Vec2> torn = torn_places(lattice, field);
-    const bool missed = torn.size() >= least_torn && !tears(line, torn, clearance(geometry.subset, line.angle));
+    const double width = clearance(geometry.subset, line.angle);
+    const bool opens =
+        jump_at(samples, behind(line, torn_behind * width), geometry.subset) > tearing_jump(field, geometry.subset);
+    const bool missed = torn.size() >= least_torn && !tears(line, torn, width, opens);
     if (missed) {
         const std::optional<Line> torn_line = along_torn(torn, samples, geometry);
         if (!torn_line) {
@@ -375,14 +431,24 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         found.status = TipStatus::outside;
         return found;
     }
+    const Vec2 d = line.direction();
+    // What the series misses is no noise: its neighbours go along with it, and a smaller ring about the tip would say another
+    // place.
+    double model_error = 0;
+    if (const std::vector<Sample> nearer = clear_of(within(samples, line.tip, inner_share * ring), line, geometry.subset);
+        static_cast<int>(nearer.size()) >= least_points) {
+        Line again = line;
+        refine(nearer, again);
+        model_error = d.dot(again.tip - line.tip);
+    }
     // Neighbouring subsets see the same pixels: as many points are independent as subsets lie side by side.
     const double overlap = std::max(1.0, std::pow(static_cast<double>(geometry.subset) / lattice.step, 2));
-    const Vec2 d = line.direction();
     found.status = TipStatus::ok;
     found.tip = line.tip;
     found.angle = std::remainder(line.angle, 2 * std::numbers::pi);
     found.length = length_in_picture(line, geometry.columns, geometry.rows);
-    found.sigma = missed ? 0.25 * geometry.subset : std::sqrt(overlap * d.dot(covariance * d));
+    found.sigma =
+        missed ? end_error(samples, line, geometry.subset) : std::hypot(std::sqrt(overlap * d.dot(covariance * d)), model_error);
     return found;
 }
 

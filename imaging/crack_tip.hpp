@@ -3,6 +3,8 @@
 #include "datasets/crack_track.hpp"
 #include "datasets/displacement_field.hpp"
 
+#include <optional>
+
 namespace crampfit {
 
 /// The picture that a field was measured on, as far as finding a tip needs it.
@@ -21,7 +23,12 @@ struct FieldGeometry {
 /// leaves the smallest sum of squares: sought on a coarse grid over the whole field, then in turn by finer angles and
 /// by Levenberg-Marquardt for the tip, at last over a disc around it. Subsets that reach over the crack or the tip take
 /// no part. Where that line misses most of the subsets that were torn, as in strongly layered wood, the crack is laid through
-/// these and ends with the last of them, to a quarter of a subset.
+/// these and ends with the last of them; how far the tip may be from there is told by how the faces close. The standard error
+/// includes what another disc would say.
 CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field);
+
+/// How far the two sides of a crack that was seen otherwise have moved apart, at most, as a field shows it [px]; none where
+/// nothing was followed on both.
+std::optional<double> motion_apart(const FieldGeometry& geometry, const DisplacementField& field, const CrackTip& crack);
 
 }  // namespace crampfit

@@ -6,16 +6,24 @@
 #include <atomic>
 #include <barrier>
 #include <cmath>
+#include <numbers>
+#include <optional>
 #include <queue>
 #include <thread>
 
 namespace crampfit {
 namespace {
 
-constexpr std::size_t round_size = 256;    // points followed at once: some milliseconds of work
-constexpr int seed_every = 4;              // points of the lattice between those that may be sought in the whole image
-constexpr std::size_t most_searches = 64;  // in the whole image
-constexpr double seed_zncc = 0.5;          // at whole pixels; the match that is begun there must reach more
+constexpr std::size_t round_size = 256;  // points followed at once: some milliseconds of work
+constexpr int seed_every = 4;            // points of the lattice between those that may be sought
+constexpr double seed_zncc = 0.5;        // at whole pixels; the match that is begun there must reach more
+
+// Searches of the whole image, each of which takes as long as some thousand matches.
+constexpr std::size_t most_first = 24;  // for the first point
+constexpr int turns = 12;               // of the subset where it is not seen as it lies: 15 degrees are left, and 20 are followed
+constexpr std::size_t most_turned = 4;  // of the points, each at all turns
+constexpr std::size_t most_of_parts = 4;  // for each part of the specimen that nothing has spread to
+constexpr std::size_t most_parts = 8;     // the largest
 
 struct Job {
     int point;
@@ -31,15 +39,19 @@ class Spreading {
         : reference_(reference), image_(image), spline_(image), lattice_(lattice), half_(subset / 2), threads_(threads) {
         for (const PointStatus status : at_start) matches_.emplace_back().status = status;
         chosen_.assign(at_start.size(), false);
+        given_up_.assign(at_start.size(), false);
         for (int i = 0; i < threads; ++i) matchers_.emplace_back(reference_, spline_, subset);
     }
 
     std::vector<SubsetMatch> run() {
-        const std::vector<int> all = seeds();
-        // The whole image is searched for some of the seeds at most; once one is found, others are sought near by.
-        const std::size_t every = (all.size() + most_searches - 1) / most_searches;
-        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every) begin_from(all[i]);
-        for (std::size_t i = 0; i < all.size() && !nothing_found(); ++i) begin_from(all[i]);
+        begin_anywhere(seeds());
+        if (nothing_found()) return std::move(matches_);
+        begin_nearby();
+        // What is left may have moved away from the rest, as halves do that a crack has parted.
+        std::size_t sought = 0;
+        for (std::vector<int> part = largest_part_left(); !part.empty() && sought < most_parts;
+             part = largest_part_left(), ++sought)
+            if (begin_in(part)) begin_nearby();
         return std::move(matches_);
     }
 
@@ -47,13 +59,95 @@ class Spreading {
     static std::size_t index(int point) { return static_cast<std::size_t>(point); }
 
     bool nothing_found() const { return low_u_ > high_u_; }
+    cv::Rect whole_image() const { return {0, 0, image_.columns, image_.rows}; }
 
-    void begin_from(int seed) {
+    /// The first point: in the whole image, as the subset lies and then turned.
+    void begin_anywhere(const std::vector<int>& all) {
+        const std::size_t every = (all.size() + most_first - 1) / most_first;
+        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every) begin_from(all[i], whole_image());
+        const std::size_t every_turned = (all.size() + most_turned - 1) / most_turned;
+        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every_turned)
+            for (int turn = 1; turn < turns && nothing_found(); ++turn) {
+                turn_ = 2 * std::numbers::pi * turn / turns;
+                begin_from(all[i], whole_image());
+            }
+    }
+
+    /// Others: as far away as what was found, and half as far again.
+    void begin_nearby() {
+        mark_left();
+        for (const int seed : seeds()) begin_from(seed, nearby(lattice_.x(seed), lattice_.y(seed)));
+    }
+
+    /// Points of a part, evenly through it: in the whole image, until one is found there.
+    bool begin_in(const std::vector<int>& part) {
+        for (std::size_t i = 0; i < most_of_parts; ++i) {
+            const int point = part[(2 * i + 1) * part.size() / (2 * most_of_parts)];
+            begin_from(point, whole_image());
+            if (matches_[index(point)].status == PointStatus::ok) return true;
+        }
+        for (const int point : part) given_up_[index(point)] = true;
+        return false;
+    }
+
+    void begin_from(int seed, const cv::Rect& window) {
         if (matches_[index(seed)].status != PointStatus::not_reached) return;
-        if (const auto guess = search(seed)) {
+        if (const auto guess = search(seed, window)) {
             jobs_ = {{seed, *guess, {}}};
             spread();
         }
+    }
+
+    /// The largest connected set of points that nothing has spread to, nor was sought for in vain; empty where all have fewer
+    /// points than a few seeds have about them.
+    std::vector<int> largest_part_left() const {
+        std::vector<int> largest;
+        std::vector<bool> seen = given_up_;
+        for (int start = 0; start < lattice_.count(); ++start) {
+            std::vector<int> part;
+            const auto take = [&](int point) {
+                if (!seen[index(point)] && matches_[index(point)].status == PointStatus::not_reached) part.push_back(point);
+                seen[index(point)] = true;
+            };
+            take(start);
+            for (std::size_t next = 0; next < part.size(); ++next)
+                for_neighbours(part[next], [&](int point, int, int) { take(point); });
+            if (part.size() > largest.size()) largest = std::move(part);
+        }
+        if (largest.size() < most_of_parts * seed_every * seed_every) return {};
+        std::ranges::sort(largest);
+        return largest;
+    }
+
+    /// Points that lie outside the image, moved as what has been followed beside them, have left it.
+    void mark_left() {
+        std::vector<int> from;
+        std::vector<bool> seen(matches_.size());
+        for (int point = 0; point < lattice_.count(); ++point)
+            if (matches_[index(point)].status == PointStatus::ok) from.push_back(point);
+        for (std::size_t next = 0; next < from.size(); ++next) {
+            const Warp warp = matches_[index(from[next])].warp;
+            for_neighbours(from[next], [&](int point, int dx, int dy) {
+                SubsetMatch& match = matches_[index(point)];
+                if (match.status != PointStatus::not_reached && match.status != PointStatus::left_picture) return;
+                const Warp on = continued(warp, dx, dy);
+                const double x = lattice_.x(point) + on.u[0], y = lattice_.y(point) + on.v[0];
+                if (seen[index(point)] || (x >= half_ && x < image_.columns - half_ && y >= half_ && y < image_.rows - half_))
+                    return;
+                seen[index(point)] = true;
+                match.warp = on;
+                match.status = PointStatus::left_picture;
+                from.push_back(point);
+            });
+        }
+    }
+
+    template <class Visit>
+    void for_neighbours(int point, Visit&& visit) const {
+        const int column = point % lattice_.columns, row = point / lattice_.columns;
+        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+            if (column + dx >= 0 && column + dx < lattice_.columns && row + dy >= 0 && row + dy < lattice_.rows)
+                visit(point + dx + dy * lattice_.columns, dx, dy);
     }
 
     /// Points that may be sought, those nearest to the picture's middle first.
@@ -70,33 +164,40 @@ class Spreading {
         return points;
     }
 
-    /// The place of the best correlation at whole pixels: in the whole image for the first seed, and for later ones in
-    /// the range of what was found and half as far again.
-    std::optional<Warp> search(int point) const {
-        const cv::Mat reference = as_matrix(reference_.picture), image = as_matrix(image_);
+    /// The place of the best correlation at whole pixels in a window of the image; none where that holds no subset.
+    std::optional<Warp> search(int point, const cv::Rect& window) const {
         const int x = lattice_.x(point), y = lattice_.y(point), subset = 2 * half_ + 1;
-        const cv::Rect window = search_window(x, y);
+        if (window.width < subset || window.height < subset) return std::nullopt;
         cv::Mat zncc;
-        cv::matchTemplate(image(window), reference(cv::Rect(x - half_, y - half_, subset, subset)), zncc, cv::TM_CCOEFF_NORMED);
+        cv::matchTemplate(as_matrix(image_)(window), turned_subset(x, y), zncc, cv::TM_CCOEFF_NORMED);
         double best = 0;
         cv::Point place;
         cv::minMaxLoc(zncc, nullptr, &best, nullptr, &place);
         if (!(best >= seed_zncc)) return std::nullopt;
+        const double c = std::cos(turn_), s = std::sin(turn_);
         Warp guess;
-        guess.u[0] = window.x + place.x + half_ - x;
-        guess.v[0] = window.y + place.y + half_ - y;
+        guess.u = {static_cast<double>(window.x + place.x + half_ - x), (c - 1) * half_, -s * half_};
+        guess.v = {static_cast<double>(window.y + place.y + half_ - y), s * half_, (c - 1) * half_};
         return guess;
     }
 
-    cv::Rect search_window(int x, int y) const {
-        const cv::Rect whole(0, 0, image_.columns, image_.rows);
-        if (nothing_found()) return whole;
+    /// The subset about a pixel of the reference, turned by `turn_` about its middle.
+    cv::Mat turned_subset(int x, int y) const {
+        const int subset = 2 * half_ + 1;
+        if (turn_ == 0) return as_matrix(reference_.picture)(cv::Rect(x - half_, y - half_, subset, subset));
+        const double c = std::cos(turn_), s = std::sin(turn_);
+        const cv::Matx23d from(c, s, x - (c + s) * half_, -s, c, y - (c - s) * half_);
+        cv::Mat turned;
+        cv::warpAffine(as_matrix(reference_.picture), turned, from, {subset, subset}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                       cv::BORDER_REFLECT_101);
+        return turned;
+    }
+
+    cv::Rect nearby(int x, int y) const {
         const int margin = 2 * half_ + static_cast<int>(std::max(high_u_ - low_u_, high_v_ - low_v_) / 2);
         const cv::Point from(x + static_cast<int>(low_u_) - margin, y + static_cast<int>(low_v_) - margin);
         const cv::Point to(x + static_cast<int>(high_u_) + margin + 1, y + static_cast<int>(high_v_) + margin + 1);
-        const cv::Rect window = cv::Rect(from, to) & whole;
-        const int subset = 2 * half_ + 1;
-        return window.width < subset || window.height < subset ? whole : window;
+        return cv::Rect(from, to) & whole_image();
     }
 
     static cv::Mat as_matrix(const FinePicture& picture) {
@@ -149,15 +250,11 @@ class Spreading {
         while (!front_.empty() && jobs_.size() < round_size) {
             const int parent = -front_.top().second;
             front_.pop();
-            const int column = parent % lattice_.columns, row = parent / lattice_.columns;
-            for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-                if (column + dx < 0 || column + dx >= lattice_.columns || row + dy < 0 || row + dy >= lattice_.rows) continue;
-                const int point = parent + dx + dy * lattice_.columns;
-                if (may_be_tried(point) && !chosen_[index(point)]) {
-                    chosen_[index(point)] = true;
-                    jobs_.push_back({point, continued(matches_[index(parent)].warp, dx, dy), {}});
-                }
-            }
+            for_neighbours(parent, [&](int point, int dx, int dy) {
+                if (!may_be_tried(point) || chosen_[index(point)]) return;
+                chosen_[index(point)] = true;
+                jobs_.push_back({point, continued(matches_[index(parent)].warp, dx, dy), {}});
+            });
         }
     }
 
@@ -191,6 +288,8 @@ class Spreading {
     std::vector<SubsetMatch> matches_;
     std::vector<Job> jobs_;                                   // of the round
     std::vector<bool> chosen_;                                // for the round
+    std::vector<bool> given_up_;                              // points of parts that were sought in the whole image in vain
+    double turn_ = 0;                                         // of subsets that are sought, clockwise as seen [rad]
     std::priority_queue<std::pair<double, int>> front_;       // ZNCC and number, negative, of points whose neighbours may be open
     double low_u_ = 1, high_u_ = 0, low_v_ = 1, high_v_ = 0;  // range of what was found [px]; empty at first
 };

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <numeric>
 
 namespace crampfit {
 namespace {
 
 constexpr double least_zncc = 0.8;
 constexpr int most_iterations = 30;
+constexpr double few = 1.0 / 32;  // of a subset's pixels; a crack that counts has an eighth of them beyond it
 constexpr double settled = 5e-4;  // last step anywhere at the subset's edge [px]: what is left is a tenth of it
 
 /// Powers of xi and eta in the terms of a warp.
@@ -89,6 +92,49 @@ double reach(const std::array<double, 6>& terms) {
     return sum;
 }
 
+// Of the smoothing that the pattern asks for.
+constexpr double details_kept =
+    0.55;  // brings what linear interpolation of a picture does below 0.005 px (PublicShiftedPictures)
+constexpr double most_smoothing = 2.5;     // [px]
+constexpr int tile = 64, most_tiles = 16;  // edge of a piece whose spectrum is taken [px]; pieces along a side
+
+/// Power of a picture's waves, the mean over pieces of it (Welch 1967), by wave numbers of a discrete Fourier transform.
+cv::Mat mean_power(const FinePicture& picture) {
+    const cv::Mat gray(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data()));
+    const cv::Size size(std::min(tile, gray.cols), std::min(tile, gray.rows));
+    cv::Mat window, power = cv::Mat::zeros(size, CV_32F);
+    cv::createHanningWindow(window, size, CV_32F);
+    const int across = std::clamp(gray.cols / size.width, 1, most_tiles),
+              down = std::clamp(gray.rows / size.height, 1, most_tiles);
+    for (int j = 0; j < down; ++j)
+        for (int i = 0; i < across; ++i) {
+            const cv::Point at((gray.cols - size.width) * (2 * i + 1) / (2 * across),
+                               (gray.rows - size.height) * (2 * j + 1) / (2 * down));
+            const cv::Mat piece = gray(cv::Rect(at, size));
+            cv::Mat waves, parts[2];
+            cv::dft((piece - cv::mean(piece)).mul(window), waves, cv::DFT_COMPLEX_OUTPUT);
+            cv::split(waves, parts);
+            power += parts[0].mul(parts[0]) + parts[1].mul(parts[1]);
+        }
+    return power;
+}
+
+/// Standard deviation of gray below which there is none but rounding: half of the median step between neighbouring grays.
+double half_a_step(const FinePicture& picture) {
+    constexpr std::size_t enough = 1 << 18;  // pixels to know the grays by
+    std::vector<float> grays;
+    const std::size_t every = (picture.gray.size() + enough - 1) / enough;
+    for (std::size_t i = 0; i < picture.gray.size(); i += every) grays.push_back(picture.gray[i]);
+    std::ranges::sort(grays);
+    std::vector<float> steps;
+    for (std::size_t i = 1; i < grays.size(); ++i)
+        if (grays[i] > grays[i - 1]) steps.push_back(grays[i] - grays[i - 1]);
+    if (steps.empty()) return 0.5;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::ranges::nth_element(steps, middle);
+    return 0.5 * std::min(1.0, static_cast<double>(*middle));
+}
+
 FinePicture smooth(FinePicture picture, double radius) {
     const cv::Mat kernel = cv::getGaussianKernel(2 * static_cast<int>(std::ceil(3 * radius)) + 1, radius, CV_32F);
     cv::Mat gray(picture.rows, picture.columns, CV_32F, picture.gray.data());
@@ -119,9 +165,38 @@ Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const
 
 }  // namespace
 
-ReferencePicture::ReferencePicture(FinePicture fine, double smoothing)
-    : picture(std::move(fine)), slopes(SplinePicture(picture).slopes()),
-      smooth_slopes(smoothing == 0 ? slopes : SplinePicture(smooth(picture, smoothing)).slopes()) {}
+ReferencePicture::ReferencePicture(FinePicture fine, std::optional<double> smoothing)
+    : picture(std::move(fine)), slopes(SplinePicture(picture).slopes()), least_deviation(half_a_step(picture)) {
+    const double radius = smoothing ? *smoothing : smoothing_for(picture);
+    smooth_slopes = radius == 0 ? slopes : SplinePicture(smooth(picture, radius)).slopes();
+}
+
+double smoothing_for(const FinePicture& picture) {
+    const cv::Mat power = mean_power(picture);
+    const auto wave_number = [](int i, int count) { return 2 * std::numbers::pi * std::min(i, count - i) / count; };
+    // Of the spline's slope at pixels: that of the wave but for the finest details, where it falls to none.
+    const auto slope = [](double k) { return 3 * std::sin(k) / (2 + std::cos(k)); };
+    const auto mean_square = [&](double radius) {
+        double sum = 0, mass = 0;
+        for (int j = 0; j < power.rows; ++j)
+            for (int i = 0; i < power.cols; ++i) {
+                const double kx = wave_number(i, power.cols), ky = wave_number(j, power.rows);
+                const double squared = slope(kx) * slope(kx) + slope(ky) * slope(ky);
+                const double weight =
+                    std::exp(-0.5 * radius * radius * (kx * kx + ky * ky)) * static_cast<double>(power.at<float>(j, i)) * squared;
+                sum += weight * squared;
+                mass += weight;
+            }
+        return sum / mass;
+    };
+    const double wanted = details_kept * mean_square(0);
+    double low = 0, high = most_smoothing;
+    while (high - low > 0.01) {
+        const double middle = (low + high) / 2;
+        (mean_square(middle) > wanted ? low : high) = middle;
+    }
+    return high;
+}
 
 template <int Order>
 SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const SplinePicture& image, int subset)
@@ -165,7 +240,10 @@ bool SubsetMatcher<Order>::take_subset(int x, int y) {
         squares += gray_[i].square();
     }
     norm_ = std::sqrt(static_cast<double>(squares.sum()));
-    return norm_ >= least_deviation * std::sqrt(count);
+    Lanes slopes = Lanes::Zero();
+    for (std::size_t i = 0; i < by_x_.size(); ++i) slopes += by_x_[i].square() + by_y_[i].square();
+    slope_ = static_cast<double>(slopes.sum()) / (2 * count);
+    return norm_ >= reference_.least_deviation * std::sqrt(count);
 }
 
 // The steepest descents are the slopes times the monomials of the warp. Sums of products of two of them are moments of
@@ -224,7 +302,6 @@ void SubsetMatcher<Order>::make_matrices() {
     descent_ = both(0);
     descent_by_gray_ = both(2);
     const double count = (2 * half_ + 1) * (2 * half_ + 1), squares = norm_ * norm_;
-    slope_ = (moments[0][0][0] + moments[3][0][0]) / (2 * count);
     tangent -= descent_ * both(4).transpose() / count + descent_by_gray_ * both(6).transpose() / squares;
     noise_ -= descent_ * descent_.transpose() / count + descent_by_gray_ * descent_by_gray_.transpose() / squares;
     tangent_.compute(tangent);
@@ -335,6 +412,25 @@ typename SubsetMatcher<Order>::Sums SubsetMatcher<Order>::sample(int x, int y, c
     return sums;
 }
 
+/// Variance of what is left of the grays, the worst few pixels left out; `mean` is of the image's gray less that of the
+/// reference, and `gain` what brings it to the contrast of the reference.
+template <int Order>
+double SubsetMatcher<Order>::residual_of_most(int x, int y, const Warp& warp, double mean, double gain) {
+    std::vector<float> squares;
+    const int subset = 2 * half_ + 1;
+    for (int row = 0; row < subset; ++row) {
+        sample_row(x, y, warp, row);
+        const float* gray = gray_[static_cast<std::size_t>(row * blocks_)].data();
+        for (int i = 0; i < subset; ++i) {
+            const double left = gain * (sampled_[static_cast<std::size_t>(i)] - mean_ - mean) - gray[i];
+            squares.push_back(static_cast<float>(left * left));
+        }
+    }
+    const auto most = static_cast<std::ptrdiff_t>(static_cast<double>(squares.size()) * (1 - few));
+    std::ranges::nth_element(squares, squares.begin() + most);
+    return std::accumulate(squares.begin(), squares.begin() + most, 0.0) / static_cast<double>(most);
+}
+
 template <int Order>
 SubsetMatch SubsetMatcher<Order>::match(int x, int y, const Warp& guess) {
     SubsetMatch found;
@@ -353,7 +449,7 @@ SubsetMatch SubsetMatcher<Order>::match(int x, int y, const Warp& guess) {
         const Sums sums = sample(x, y, found.warp);
         const double mean = sums.gray / count;
         const double norm = std::sqrt(std::max(0.0, sums.squared - sums.gray * mean));
-        if (norm < least_deviation * std::sqrt(count)) {
+        if (norm < reference_.least_deviation * std::sqrt(count)) {
             found.status = PointStatus::no_contrast;
             return found;
         }
@@ -369,6 +465,9 @@ SubsetMatch SubsetMatcher<Order>::match(int x, int y, const Warp& guess) {
         if (step.template lpNorm<Eigen::Infinity>() < settled) {
             found.residual = 2 * norm_ * norm_ * (1 - found.zncc) / (count - 2 * terms - 2);
             found.slope = slope_;
+            found.apart = found.residual > most_apart * most_apart * slope_
+                              ? residual_of_most(x, y, found.warp, mean, norm_ / norm)
+                              : found.residual;
             found.sigma = standard_error(found.residual);
             found.status = found.zncc < least_zncc ? PointStatus::low_correlation : PointStatus::ok;
             return found;

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -21,16 +22,24 @@ struct Warp {
 
 /// The reference picture, made ready to take subsets from.
 struct ReferencePicture {
-    /// `smoothing` is the radius (standard deviation) of a Gaussian, 0 for none [px].
-    ReferencePicture(FinePicture fine, double smoothing);
+    /// `smoothing` is the radius (standard deviation) of a Gaussian, 0 for none [px]; where left out, what the pattern asks for.
+    ReferencePicture(FinePicture fine, std::optional<double> smoothing);
 
     FinePicture picture;
     SplinePicture::Slopes slopes;
     SplinePicture::Slopes smooth_slopes;  // of the smoothed picture
+    // Subsets whose gray has a smaller standard deviation are flat [gray]: half of the step between neighbouring grays, rounding
+    // to which gives 0.29 of it. The step is 1 in pictures of 8 bits, and less in those of more.
+    double least_deviation;
 };
 
-/// Subsets whose gray has a smaller standard deviation are flat: rounding to whole grays alone gives 0.29.
-inline constexpr double least_deviation = 0.5;  // [gray]
+/// The radius of the Gaussian with which `details_kept` of the mean square wave number is left in a picture's slopes, 2.5 px at
+/// most. That mean, each wave counting by its slope's power, is what errors of the camera's sampling go with (SubsetMatcher); the
+/// scatter by noise grows the more is taken off. A pattern of finer spots so is smoothed less.
+double smoothing_for(const FinePicture& picture);
+
+/// Motion within a subset that its warp does not follow and that tells that it reaches over a crack: root mean square [px].
+inline constexpr double most_apart = 0.1;
 
 /// What was found for a subset. `status` is ok, no_contrast, no_convergence, left_picture or low_correlation.
 struct SubsetMatch {
@@ -38,8 +47,9 @@ struct SubsetMatch {
     Warp warp;
     double zncc = 0;      // zero-normalised correlation coefficient
     double residual = 0;  // variance of what is left of the grays [gray^2]
-    double slope = 0;     // mean square of the reference's slope along x or y, fine details left out [gray^2/px^2]
-    double sigma = 0;     // standard error of u[0] and v[0] (root mean square of the two), by the noise of the pictures [px]
+    double apart = 0;  // the same without the few pixels that are worst: what hot pixels and reflections do is no motion [gray^2]
+    double slope = 0;  // mean square of the reference's slope along x or y [gray^2/px^2]
+    double sigma = 0;  // standard error of u[0] and v[0] (root mean square of the two), by the noise of the pictures [px]
 };
 
 /// Follows a square subset of the reference into an image by inverse-compositional Gauss-Newton: Pan, Li and Tong
@@ -83,6 +93,7 @@ class SubsetMatcher {
     bool take_subset(int x, int y);
     void make_matrices();
     double standard_error(double residual_variance) const;
+    double residual_of_most(int x, int y, const Warp& warp, double mean, double gain);
     bool stays_inside(int x, int y, const Warp& warp) const;
     void sample_row(int x, int y, const Warp& warp, int row);
     Sums sample(int x, int y, const Warp& warp);

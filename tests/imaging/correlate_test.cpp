@@ -12,6 +12,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+#include <optional>
+#include <random>
 
 using namespace crampfit;
 
@@ -91,6 +94,56 @@ double cramer_rao(const FinePicture& clean, const PointLattice& lattice, int sub
     return std::sqrt(sum / lattice.count());
 }
 
+/// A pattern of cosine waves, six to twenty pixels long: its gray is known at any place, so that any picture of it is exact up to
+/// noise of one gray and rounding.
+class Waves {
+  public:
+    explicit Waves(unsigned seed = 1) {
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<> part(0, 1);
+        for (int i = 0; i < 60; ++i) {
+            const double length = 6 + 14 * part(random), direction = 2 * std::numbers::pi * part(random);
+            waves_.push_back({2 * std::numbers::pi / length * Vec2(std::cos(direction), std::sin(direction)),
+                              2 * std::numbers::pi * part(random)});
+        }
+    }
+
+    /// `material` gives the place of the reference that a place of the picture shows, or none in a gap.
+    FinePicture picture(const std::function<std::optional<Vec2>(const Vec2&)>& material, unsigned shot) const {
+        std::mt19937 random(100 + shot);
+        std::normal_distribution<> noise(0, 1);
+        FinePicture picture{columns, rows, {}};
+        for (int y = 0; y < rows; ++y)
+            for (int x = 0; x < columns; ++x) {
+                const std::optional<Vec2> place = material(Vec2(x, y));
+                double gray = place ? 128 : 15;
+                if (place)
+                    for (const auto& [number, phase] : waves_) gray += 6 * std::cos(number.dot(*place) + phase);
+                picture.gray.push_back(static_cast<float>(std::clamp(std::round(gray + noise(random)), 0.0, 255.0)));
+            }
+        return picture;
+    }
+
+    FinePicture reference() const {
+        return picture([](const Vec2& place) { return std::optional(place); }, 0);
+    }
+
+    static constexpr int columns = 300, rows = 260;
+
+  private:
+    struct Wave {
+        Vec2 number;  // [rad/px]
+        double phase;
+    };
+    std::vector<Wave> waves_;
+};
+
+/// Whether all of a subset that moves as a whole, turned or not, is in the picture.
+bool stays_in(const Vec2& middle) {
+    constexpr double reach = 23;  // half the diagonal of a subset, and a pixel
+    return middle.x() > reach && middle.x() < Waves::columns - reach && middle.y() > reach && middle.y() < Waves::rows - reach;
+}
+
 /// The middle of the picture stays in place.
 PlaneField stretched(double by) { return polynomial_field({256, 256}, {by, 0.3 * by, 0, 0, 0}, {-0.4 * by, -0.5 * by, 0, 0, 0}); }
 
@@ -143,7 +196,7 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
             camera_options.noise = noise;
             const VirtualCamera camera(camera_options);
             const PlaneField truth = polynomial_field({0, 0}, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}, {0.3, -0.7});
-            for (const double smoothing : {0.0, CorrelateOptions{}.smoothing}) {
+            for (const std::optional<double> smoothing : {std::optional(0.0), std::optional<double>()}) {
                 CorrelateOptions options;
                 options.step = 16;
                 options.order = order;
@@ -153,10 +206,11 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
                     compare(correlator.lattice(), correlator.field(fine(camera.photograph(truth.displacement, 1))), truth);
                 const double bound = cramer_rao(clean, correlator.lattice(), options.subset, order, noise);
                 std::printf("order %d, noise %g, smoothing %g px: scatter %.4f px, said %.4f px, Cramer-Rao %.4f px\n", order,
-                            noise, smoothing, errors.worst_displacement, errors.sigma, bound);
+                            noise, smoothing.value_or(smoothing_for(fine(camera.photograph(0)))), errors.worst_displacement,
+                            errors.sigma, bound);
                 // Interpolation hides a tenth of the noise, and adds some to the slopes.
                 EXPECT_NEAR(errors.sigma / errors.worst_displacement, 1.0, 0.15);
-                if (smoothing == 0) {
+                if (smoothing) {
                     EXPECT_NEAR(errors.worst_displacement / bound, 1.0, 0.15);
                 }
             }
@@ -266,4 +320,127 @@ TEST(UnitCorrelate, FlatAndUnrelatedPicturesGiveNoPoints) {
 
     const VirtualCamera other({.columns = 200, .rows = 150, .seed = 2});
     for (const PointStatus status : correlator.field(fine(other.photograph(0))).status) EXPECT_NE(status, PointStatus::ok);
+}
+
+// Parts that have moved away from each other by more than a subset are both followed, wherever they are.
+TEST(VerificationCorrelate, HalvesThatACrackHasParted) {
+    const Waves waves;
+    const Correlator correlator(waves.reference(), {}, {}, "reference");
+    const PointLattice& lattice = correlator.lattice();
+    const double crack = 130.3;
+    for (const double apart : {30.0, 50.0, 80.0}) {
+        const auto material = [&](const Vec2& place) -> std::optional<Vec2> {
+            if (place.y() < crack - apart / 2) return place + Vec2(0, apart / 2);
+            if (place.y() > crack + apart / 2) return place - Vec2(0, apart / 2);
+            return std::nullopt;
+        };
+        const DisplacementField field = correlator.field(waves.picture(material, 1));
+        for (int point = 0; point < lattice.count(); ++point) {
+            const auto i = static_cast<std::size_t>(point);
+            const Vec2 place(lattice.x(point), lattice.y(point));
+            const double v = place.y() < crack ? -apart / 2 : apart / 2;
+            if (std::abs(place.y() - crack) < 17 || !stays_in(place + Vec2(0, v))) continue;
+            ASSERT_EQ(field.status[i], PointStatus::ok) << apart << " px, at " << place.transpose();
+            EXPECT_NEAR(field.v[i], v, 0.05);
+        }
+    }
+}
+
+// What has left the picture is told, and is not sought in all of it.
+TEST(VerificationCorrelate, ShiftedByAThirdOfThePicture) {
+    const Waves waves;
+    const Correlator correlator(waves.reference(), {}, {}, "reference");
+    const PointLattice& lattice = correlator.lattice();
+    const DisplacementField field =
+        correlator.field(waves.picture([](const Vec2& place) { return std::optional<Vec2>(place + Vec2(100.25, 0)); }, 1));
+    for (int point = 0; point < lattice.count(); ++point) {
+        const bool left = lattice.x(point) - 100.25 - 15 < 0;
+        EXPECT_EQ(field.status[static_cast<std::size_t>(point)], left ? PointStatus::left_picture : PointStatus::ok);
+    }
+}
+
+TEST(VerificationCorrelate, TurnedByMoreThanASubsetIsFoundAt) {
+    const Waves waves;
+    const Correlator correlator(waves.reference(), {}, {}, "reference");
+    const PointLattice& lattice = correlator.lattice();
+    const Vec2 middle(Waves::columns / 2, Waves::rows / 2);
+    for (const double degrees : {20.0, 26.0}) {
+        const Eigen::Rotation2D<double> turn(degrees * std::numbers::pi / 180);
+        const DisplacementField field = correlator.field(
+            waves.picture([&](const Vec2& place) { return std::optional<Vec2>(middle + turn.inverse() * (place - middle)); }, 1));
+        for (int point = 0; point < lattice.count(); ++point) {
+            const auto i = static_cast<std::size_t>(point);
+            const Vec2 place(lattice.x(point), lattice.y(point)), moved = middle + turn * (place - middle);
+            if (!stays_in(moved)) continue;
+            ASSERT_EQ(field.status[i], PointStatus::ok) << degrees << " degrees, at " << place.transpose();
+            EXPECT_LT((Vec2(field.u[i], field.v[i]) - (moved - place)).norm(), 0.05);
+        }
+    }
+}
+
+// A few pixels that show something else are no crack.
+TEST(VerificationCorrelate, NothingMovesApartInARigidMotion) {
+    const Waves waves;
+    const auto shifted = [](const Vec2& place) { return std::optional<Vec2>(place - Vec2(0.25, -0.37)); };
+    FinePicture reference = waves.reference(), image = waves.picture(shifted, 1), dim = image;
+    for (float& gray : dim.gray) gray = std::round(0.6f * gray + 20);
+    std::mt19937 random(5);
+    std::uniform_int_distribution<std::size_t> any(0, reference.gray.size() - 1);
+    for (int i = 0; i < 16; ++i) {
+        const std::size_t hot = any(random);
+        reference.gray[hot] = image.gray[hot] = 255;
+    }
+    const Correlator correlator(reference, {}, {}, "reference");
+    for (const FinePicture& seen : {image, dim}) {
+        const DisplacementField field = correlator.field(seen);
+        EXPECT_EQ(std::ranges::count(field.status, PointStatus::ok), correlator.lattice().count());
+    }
+}
+
+// A camera of ten bits that writes them into sixteen makes a dark picture, whose grays are finer than the 255th of white.
+TEST(VerificationCorrelate, TenBitsInAFileOfSixteen) {
+    const Waves waves;
+    const auto ten_bits = [](FinePicture picture) {
+        for (float& gray : picture.gray) gray = std::round(4 * gray) / 257;
+        return picture;
+    };
+    const Correlator correlator(ten_bits(waves.reference()), {}, {}, "reference");
+    const DisplacementField field = correlator.field(
+        ten_bits(waves.picture([](const Vec2& place) { return std::optional<Vec2>(place - Vec2(0.25, -0.37)); }, 1)));
+    for (int point = 0; point < correlator.lattice().count(); ++point)
+        ASSERT_EQ(field.status[static_cast<std::size_t>(point)], PointStatus::ok);
+}
+
+// Fine patterns are smoothed less than coarse ones: whatever the spots, scatter stays within 1.6 times the bound of Cramer and
+// Rao.
+TEST(VerificationCorrelate, SmoothingIsThatOfThePattern) {
+    for (const double spot : {1.0, 1.6, 2.5}) {
+        VirtualCameraOptions options{.columns = 300, .rows = 260, .spot_radius = spot, .noise = 0};
+        const FinePicture clean = fine(VirtualCamera(options).photograph(0));
+        options.noise = 2;
+        const VirtualCamera camera(options);
+        const PlaneField truth = polynomial_field({0, 0}, {0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}, {0.25, -0.37});
+        const Correlator correlator(fine(camera.photograph(0)), {}, {}, "reference");
+        const Errors errors =
+            compare(correlator.lattice(), correlator.field(fine(camera.photograph(truth.displacement, 1))), truth);
+        const double bound = cramer_rao(clean, correlator.lattice(), CorrelateOptions().subset, 1, 2);
+        std::printf("spots of %.1f px: smoothing %.2f px, scatter %.4f px, Cramer-Rao %.4f px, bias %.4f %.4f px\n", spot,
+                    smoothing_for(fine(camera.photograph(0))), errors.worst_displacement, bound, errors.bias_u, errors.bias_v);
+        EXPECT_LT(errors.worst_displacement, 1.6 * bound);
+        EXPECT_LT(std::hypot(errors.bias_u, errors.bias_v), 0.005);
+    }
+}
+
+TEST(UnitVirtualCamera, OptionsAreNamedAsOnTheCommandLine) {
+    const auto message = [](const VirtualCameraOptions& options) -> std::string {
+        try {
+            options.validate();
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_NE(message({.noise = -1}).find("command line: --noise"), std::string::npos) << message({.noise = -1});
+    EXPECT_NE(message({.spot_radius = 0}).find("command line: --spot"), std::string::npos);
+    EXPECT_NE(message({.columns = 0}).find("virtual camera: columns"), std::string::npos);
 }

@@ -73,6 +73,75 @@ TEST(VerificationCrackTip, WithinTwoSubsetsInEveryFrame) {
     }
 }
 
+// Where a crack has opened too little to tear a subset near its tip, torn ones farther back do not lead the tip astray: it is
+// within half a subset, and no farther off than three of the standard errors that it tells, and a pixel.
+TEST(VerificationCrackTip, SmallOpeningsAndNoise) {
+    struct Shot {
+        double opening;  // at 100 px behind the tip [px]
+        double noise;    // [gray]
+    };
+    for (const Shot& shot : {Shot{0.2, 1}, {0.3, 1}, {0.4, 1}, {0.5, 1}, {0.6, 1}, {0.8, 1}, {1.2, 3}, {1.2, 6}}) {
+        VirtualCameraOptions options;
+        options.columns = 480;
+        options.rows = 400;
+        options.contrast = 40;
+        options.noise = shot.noise;
+        options.seed = 3;
+        VirtualTest test(options);
+        const Vec2 truth(230.3, 199.6);
+        const CrackTip tip = test.tip(crack_field(truth, 0, shot.opening, 0, {0, 0}, 1.8));
+        ASSERT_EQ(tip.status, TipStatus::ok) << shot.opening;
+        const Vec2 error = tip.tip - truth;
+        std::printf("opening %.1f px, noise %g: off by %6.2f %6.2f px, said %.2f px\n", shot.opening, shot.noise, error.x(),
+                    error.y(), tip.sigma);
+        EXPECT_LT(error.norm(), subset / 2);
+        EXPECT_LT(std::abs(error.x()), 3 * tip.sigma + 1);
+    }
+}
+
+// Layers of unlike strain along the crack are no part of the series: the tip may be off, as far as it says.
+TEST(VerificationCrackTip, LayersAreInTheStandardError) {
+    VirtualCameraOptions options;
+    options.columns = 480;
+    options.rows = 400;
+    VirtualTest test(options);
+    constexpr double period = 60, soft = 0.75 * period;  // of the layers, across them [px]
+    for (const double strain : {0.005, 0.01, 0.02}) {
+        const auto layered = [&](double x) {
+            const double from = period * std::floor(x / period);
+            return strain * (from * soft / period + std::min(x - from, soft));
+        };
+        const Vec2 truth(230.3, 199.6);
+        const PlaneDisplacement crack = crack_field(truth, 0, 2, 0);
+        const CrackTip tip = test.tip([&](const Vec2& place) { return Vec2(crack(place) + Vec2(layered(place.x()), 0)); });
+        ASSERT_EQ(tip.status, TipStatus::ok);
+        const Vec2 error = tip.tip - truth;
+        std::printf("layers of strain %g: off by %6.2f %6.2f px, said %.2f px\n", strain, error.x(), error.y(), tip.sigma);
+        EXPECT_LT(std::abs(error.x()), 3 * tip.sigma);
+    }
+}
+
+// A dark line whose sides lie still is no crack.
+TEST(VerificationCrackTip, NoneAtAShadow) {
+    VirtualCameraOptions options;
+    options.columns = 480;
+    options.rows = 400;
+    const VirtualCamera camera(options);
+    const Correlator correlator(fine(camera.photograph(0)), {}, {}, "reference");
+    const FieldGeometry geometry{correlator.lattice(), CorrelateOptions().subset, options.columns, options.rows};
+    FinePicture shadowed = fine(camera.photograph(1));
+    for (std::size_t y = 190; y < 196; ++y)
+        for (std::size_t x = 0; x < 200; ++x) shadowed.gray[y * 480 + x] *= 0.3f;
+    CrackTip line{.status = TipStatus::ok, .tip = {200, 193}, .angle = 0, .length = 200.5, .sigma = 1};
+    const DisplacementField still = correlator.field(shadowed);
+    EXPECT_EQ(find_crack_tip(geometry, still).status, TipStatus::no_crack);
+    ASSERT_TRUE(motion_apart(geometry, still, line));
+    EXPECT_LT(*motion_apart(geometry, still, line), 0.05);
+    const PlaneDisplacement crack = crack_field({200, 193}, 0, 1, 0);  // sqrt(2) px at the picture's side
+    const DisplacementField open = correlator.field(fine(camera.photograph(crack, 2)));
+    EXPECT_NEAR(*motion_apart(geometry, open, line), std::sqrt(1.7), 0.2);
+}
+
 TEST(VerificationCrackTip, NoneWhereThereIsNoCrack) {
     VirtualCameraOptions options;
     options.columns = 320;
