@@ -72,6 +72,29 @@ Scene growing_strip(double cells, int points_per_cell) {
     return scene;
 }
 
+// ---- a crack that comes to stiffer wood: what its next 0.2 mm, up to the boundary, release is least
+
+constexpr double way_to_boundary = 0.2e-3;
+// By finite elements, good to 2e-4: tests/forward/boundary_reference.py [J/m^2].
+constexpr double rate_up_to_boundary = 1.6550;
+
+Scene to_stiffer_wood(double cells, int points_per_cell) {
+    constexpr double boundary = 2.025e-3;
+    Scene scene = with_points(two_woods(boundary, boundary - way_to_boundary, way_to_boundary / cells), points_per_cell);
+    scene.cracks[0].direction = GrowthDirection::straight;
+    scene.cracks[0].advance = way_to_boundary;
+    for (auto& [name, wood] : scene.materials) wood.toughness = 0.25 * rate_up_to_boundary;  // it runs at half the pull
+    scene.stop.crack_length = boundary;
+    return scene;
+}
+
+// Of a scene that runs at half of this pull.
+std::function<double(const Record&)> at_growth(double pull) {
+    return [pull](const Record& record) {
+        return record.driving.empty() ? std::nan("") : record.driving.front().displacement / (0.5 * pull);
+    };
+}
+
 }  // namespace
 
 Scene edge_crack(double cells, double share, int points_per_cell) {
@@ -156,9 +179,16 @@ std::vector<Problem> problems() {
          {5, 10, 20},
          0.0,
          growing_strip,
-         [](const Record& record) {
-             return record.driving.empty() ? std::nan("") : record.driving.front().displacement / (0.5 * strip_pull);
-         }},
+         at_growth(strip_pull)},
+        {"wood 30 times as stiff ahead",
+         "displacement at growth",
+         "finite elements",
+         1e-4,
+         "advance",
+         {1, 2, 4},
+         0.0,
+         to_stiffer_wood,
+         at_growth(1e-5)},
     };
 }
 

@@ -106,6 +106,23 @@ void load_sides(Scene& scene, Stress stress) {
     scene.measure = {"hinge", "hinge"};
 }
 
+/// 4 x 4 mm, E 40 MPa left of a sharp boundary and 1200 MPa right of it, pulled apart by 0.02 mm in a second; a crack that grows
+/// at half height from the left, its tip at `tip` [m].
+inline Scene two_woods(double boundary, double tip, double cell) {
+    Scene scene = at_rest({4e-3, 4e-3}, cell);
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{Vec2(-1000.0 + boundary, 2e-3), 2000.0, 0.5, 0.0};
+    scene.materials["LW"] = scene.materials["EW"];
+    scene.materials["LW"].youngs_modulus = 1200e6;
+    scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, -1e-5})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 2e-3), Vec2(tip, 2e-3)};
+    crack.grows = Growth::end;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    return scene;
+}
+
 struct SlantedCrack {
     double cells = 10.0;         // per half crack
     double angle = 0.0;          // of the crack against the grid [rad]

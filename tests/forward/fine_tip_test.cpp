@@ -12,22 +12,7 @@
 namespace crampfit::test {
 namespace {
 
-// 4 x 4 mm, E 40 MPa left of a boundary and 1200 MPa right of it, pulled apart by 0.02 mm; the crack runs at half height from the
-// left.
-Scene two_woods(double boundary, double tip, double cell) {
-    Scene scene = at_rest({4e-3, 4e-3}, cell);
-    scene.specimen.material.clear();
-    scene.specimen.rings = Rings{Vec2(-1000.0 + boundary, 2e-3), 2000.0, 0.5, 0.0};
-    scene.materials["LW"] = scene.materials["EW"];
-    scene.materials["LW"].youngs_modulus = 1200e6;
-    scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, -1e-5})};
-    Crack crack;
-    crack.points = {Vec2(0.0, 2e-3), Vec2(tip, 2e-3)};
-    crack.grows = Growth::end;
-    scene.cracks = {crack};
-    scene.measure = {"top", "top"};
-    return scene;
-}
+using reference::two_woods;
 
 // In boxes about the way from the tip as it is to the tip a little further, or about another way.
 MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numbers = {}, std::optional<Vec2> from = {},
