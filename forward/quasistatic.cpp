@@ -276,6 +276,10 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
     return std::abs(change - added) <= most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;
 }
 
+Quasistatic::Known Quasistatic::known_here(int time) const {
+    return {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
+}
+
 // A displacement of a place, on the fields of one that follows it.
 std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& before, int to) const {
     if (to == from) return before;
@@ -284,36 +288,52 @@ std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& befo
     return displacement;
 }
 
-// From one time to another much changes about bodies that slide, but it changes alike at the places before: starts with what the
-// nearest of these has gone between the two times.
+// From one time to another much changes about bodies that slide, but it changes alike at the places before, and at those beside it
+// that the crack has been tried to go on to from there: what the nearest that knows both times has gone between them, on the
+// fields of this place; where it begins is a time that `known` has.
+std::optional<Quasistatic::Way> Quasistatic::way_to(int number, int time, const std::map<int, Known>& known) const {
+    int place = -1, from = 0, before = number;
+    const auto consider = [&](int other) {
+        if (place >= 0 || !places_[other].known.count(time)) return;
+        for (const auto& [t, state] : places_[other].known)
+            if (t > 0 && t != time && known.count(t) && (place < 0 || std::abs(t - time) < std::abs(from - time)))
+                place = other, from = t;
+    };
+    for (int back = 0; before >= 0 && back <= farthest_back; ++back, before = places_[before].parent) {
+        consider(before);
+        for (const auto& [step, beside] : places_[before].next) consider(beside);
+        if (place >= 0) break;
+    }
+    if (place < 0) return std::nullopt;
+    const Known& start = places_[place].known.at(from);
+    const Known& end = places_[place].known.at(time);
+    Way way{from, end.displacement, end.contacts.moved};
+    for (std::size_t f = 0; f < way.displacement.size(); ++f) way.displacement[f] -= start.displacement[f];
+    for (std::size_t d = 0; d < way.moved.size(); ++d) way.moved[d] -= start.contacts.moved[d];
+    if (place != before) way.displacement.resize(way.displacement.size() - places_[place].new_fields.size());
+    way.displacement = handed_on(before, way.displacement, number);
+    return way;
+}
+
+// From a state of this place that is known as others have gone on from there.
 bool Quasistatic::solve_predicted(std::size_t number, int time) {
-    if (plan_.friction) return false;  // a state hangs on the way to it
-    int before = places_[number].parent;
-    for (int back = 1; before >= 0 && !places_[before].known.count(time); ++back)
-        before = back < farthest_back ? places_[before].parent : -1;
-    if (before < 0) return false;
-    const std::map<int, Known>& there = places_[before].known;
-    const Known* from = nullptr;
-    for (const auto& [t, known] : places_[number].known)
-        if (there.count(t) && (!from || std::abs(t - time) < std::abs(from->time - time))) from = &known;
-    if (!from || from->time == 0) return false;
-    std::vector<Vec2> gone = there.at(time).displacement;
-    const std::vector<Vec2>& start = there.at(from->time).displacement;
-    for (std::size_t f = 0; f < gone.size(); ++f) gone[f] -= start[f];
-    std::vector<Vec2> predicted = handed_on(before, gone, static_cast<int>(number));
-    for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += from->displacement[f];
-    Equilibrium::Contacts contacts = from->contacts;
-    for (std::size_t d = 0; d < contacts.moved.size(); ++d)
-        contacts.moved[d] += there.at(time).contacts.moved[d] - there.at(from->time).contacts.moved[d];
+    const std::map<int, Known>& known = places_[number].known;
+    const auto way = plan_.friction ? std::nullopt : way_to(static_cast<int>(number), time, known);
+    if (!way) return false;  // with friction a state hangs on the way to it
+    const Known& from = known.at(way->from);
+    std::vector<Vec2> predicted = from.displacement;
+    for (std::size_t f = 0; f < predicted.size(); ++f) predicted[f] += way->displacement[f];
+    Equilibrium::Contacts contacts = from.contacts;
+    for (std::size_t d = 0; d < contacts.moved.size(); ++d) contacts.moved[d] += way->moved[d];
     equilibrium_.set_displacements(predicted, time_of(time), contacts);
-    return solve_from(from->potential, from->power, time_of(from->time), time_of(time));
+    return solve_from(from.potential, from.power, time_of(from.time), time_of(time));
 }
 
 // Newton's method from the nearest equilibrium that is known: of this place, or handed on from the place before.
 bool Quasistatic::solve_for(std::size_t number, int time) {
     Place& place = places_[number];
     enter(place);
-    if (solve_predicted(number, time)) return true;
+    if (!place.known.count(time) && solve_predicted(number, time)) return true;
     const std::vector<Vec2> unloaded(equilibrium_.displacements().size(), Vec2::Zero());
     Known from{0, unloaded, std::numeric_limits<double>::infinity(), 0.0};
     int nearest = std::numeric_limits<int>::max();
@@ -330,15 +350,18 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
     const int least_parts = std::max(1, std::abs(time - from.time));
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
-        double potential = from.potential;
-        double power = from.power;
         bool good = true;
         if (from.time != time && !place.known.count(from.time) &&
             std::isfinite(from.potential)) {  // growth first, then more load
-            good = solve_from(potential, power, time_of(from.time), time_of(from.time));
-            potential = equilibrium_.potential();
-            power = equilibrium_.power();
+            good = solve_from(from.potential, from.power, time_of(from.time), time_of(from.time));
+            if (good) {
+                place.known[from.time] = from = known_here(from.time);
+                if (solve_predicted(number, time)) return true;
+                equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
+            }
         }
+        double potential = from.potential;
+        double power = from.power;
         for (int part = 1; part <= parts && good; ++part) {
             good = solve_from(potential, power, equilibrium_.time(),
                               std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
@@ -416,8 +439,7 @@ bool Quasistatic::find(std::size_t number, int time) {
     }
     if (good) {
         if (!scene_.output.probes.places.empty()) equilibrium_.refine();
-        place.known[time] = {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(),
-                             equilibrium_.contacts()};
+        place.known[time] = known_here(time);
         keep(number, time, load_state(missed_at(number, false)));
         keep_probes(number, time);
         return true;

@@ -82,6 +82,11 @@ class Quasistatic {
         double power;                    // [W]
         Equilibrium::Contacts contacts = {};
     };
+    struct Way {                         // from one equilibrium to another
+        int from;                        // the time of the one
+        std::vector<Vec2> displacement;  // [fields] [m]
+        std::vector<Vec2> moved;         // [drivers] of free bodies [m]
+    };
     struct Slopes {  // of an equilibrium [numbers]
         std::vector<LoadState> states;
         std::vector<std::vector<Vec2>> probes;  // [readings] of the scene's [m]; empty: none
@@ -147,7 +152,9 @@ class Quasistatic {
     std::pair<bool, bool> on_both_grids(const Second& second, const Own& own);
     bool know_linear(std::size_t number);
     bool solve_for(std::size_t number, int time);
+    std::optional<Way> way_to(int number, int time, const std::map<int, Known>& known) const;
     bool solve_predicted(std::size_t number, int time);
+    Known known_here(int time) const;
     std::vector<Vec2> handed_on(int from, const std::vector<Vec2>& before, int to) const;
     bool solve_from(double potential, double power, double from, double time);
     bool know_ahead(std::size_t number, int time);
