@@ -165,7 +165,7 @@ Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const 
         for (BorderLine& border : round.borders) border.move(edges.place(), gray.rows);
     WoodLevels levels;
     round.degree = density_degree(wood, gray, valid, rings, round.borders, edges, width, levels);
-    if (round.borders.empty()) {  // then it is not known how dark LW is
+    if (round.borders.size() < 2) {  // without a whole ring it is not known how dark LW is
         round.features = cv::Mat(gray.size(), CV_8U, cv::Scalar(static_cast<double>(Feature::wood)));
     } else {
         const cv::Mat around = rings.bend(wood.blurred_along(std::max(8.0, 0.5 * width)).gray);

@@ -402,7 +402,14 @@ TEST(UnitSegment, PicturesWithoutRingsGiveNoneAndDoNotFail) {
     cv::RNG(3).fill(noise, cv::RNG::UNIFORM, 0, 256);
     step.colRange(32, 64) = 200;
     dot.at<std::uint8_t>(8, 8) = 255;
-    for (const cv::Mat& pixels : {noise, step, dot}) {
+    cv::Mat brighter(300, 400, CV_8U), half(300, 400, CV_8U, cv::Scalar(190));
+    for (int x = 0; x < 400; ++x) brighter.col(x) = 50 + 150 * x / 399;
+    half.colRange(0, 200) = 60;
+    for (const cv::Mat& pixels : {brighter, half}) {
+        const std::vector<std::uint8_t> label = segment_pixels(pixels).specimen.label;
+        EXPECT_EQ(std::ranges::count(label, Specimen::void_label), 0);  // how dark wood is nothing says
+    }
+    for (const cv::Mat& pixels : {noise, step, dot, brighter, half}) {
         const Specimen specimen = segment_pixels(pixels).specimen;
         EXPECT_TRUE(specimen.rings.empty()) << pixels.size();
         for (const float angle : specimen.orientation) ASSERT_TRUE(angle >= 0 && angle <= pi + 1e-6);
