@@ -28,7 +28,8 @@ constexpr double least_coherency = 0.25;      // of the picture; noise has some 
 constexpr int least_side = 16;                // pixels
 constexpr std::size_t most_pixels = 1 << 26;  // some hundred bytes are needed for each
 
-constexpr double brightest_share = 0.999;  // of the pixels are no brighter than what counts as brightest: glints and hot pixels
+// Where the brightest pixel is brighter by this factor than this share of all, it and the like are glints or hot pixels.
+constexpr double glint = 1.25, usual_share = 0.999;
 constexpr double least_ring = 15, least_latewood = 4;  // pixels; narrower, and LW fractions are off by more than 2 %
 constexpr double most_void = 0.5;                      // of the picture: more is worth a warning
 
@@ -53,8 +54,8 @@ Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
     if (!(brightest > darkest))
         fail(brightest > 0 ? "shows nothing: all pixels are equally bright" : "shows nothing: all pixels are black");
     gray.convertTo(pixels.gray, CV_32F);
-    const double usual = quantile({pixels.gray.begin<float>(), pixels.gray.end<float>()}, brightest_share);
-    if (usual > darkest) brightest = usual;  // else nearly all is as dark as the darkest
+    const double usual = quantile({pixels.gray.begin<float>(), pixels.gray.end<float>()}, usual_share);
+    if (usual > darkest && brightest > glint * usual) brightest = usual;  // else nearly all is as dark as the darkest
     pixels.gray = cv::min(pixels.gray / brightest, 1.0);
     if (stored.channels() == 3) stored.convertTo(pixels.bgr, CV_32FC3, 1 / brightest);
     return pixels;
