@@ -40,7 +40,7 @@ std::vector<BenchRun> bench_runs() {
                 const Scene moving = in_damped_motion(scene, problem.slowest);
                 runs.push_back({problem, "explicit", options, cells, moving});
                 if (cells <= most_spline_cells)
-                    runs.push_back({problem, "explicit", options + ", B-splines", cells, with_splines(moving)});
+                    runs.push_back({problem, "explicit", options + " and B-splines", cells, with_splines(moving)});
             }
         }
     }

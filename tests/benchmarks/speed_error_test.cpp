@@ -39,6 +39,9 @@ TEST(UnitBench, TableHasAsManyFieldsAsItsHeader) {
         start = end + 1;
     }
     EXPECT_EQ(start, text.size());
+    for (const BenchRun& run : bench_runs())
+        for (const std::string& field : {run.problem.name, run.problem.quantity, run.options, run.problem.counted})
+            EXPECT_EQ(field.find(','), std::string::npos) << field;
 }
 
 }  // namespace
