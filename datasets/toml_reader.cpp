@@ -126,16 +126,22 @@ Document::Applied Document::apply(const std::string& key, const std::string& val
     return applied;
 }
 
+// For errors: tables and lists on a line, and no more of them than tells which one is meant.
 std::string Entry::written() const {
+    constexpr std::size_t most = 60;
     if (node_ == nullptr) {
         return "(missing)";
+    }
+    if (is_table()) {
+        return "(a table)";
     }
     if (const auto text = node_->value_exact<std::string>()) {
         return *text;
     }
     std::ostringstream out;
     node_->visit([&](const auto& node) { out << node; });
-    return out.str();
+    const std::string whole = out.str();
+    return whole.size() <= most ? whole : whole.substr(0, most) + " ...";
 }
 
 std::pair<Place, std::string> Entry::origin() const {

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -430,7 +432,7 @@ Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average
     bool all_alike = true;
     Coefficients mean = Coefficients::Zero();
     Eigen::Matrix<double, 3, 2> first = Eigen::Matrix<double, 3, 2>::Zero();              // means of E', r and p, times x and y
-    Eigen::Vector3d second = Eigen::Vector3d::Zero(), seconds = Eigen::Vector3d::Zero();  // of E' and of 1, times xx, xy, yy
+    Eigen::Vector3d second = Eigen::Vector3d::Zero(), seconds = Eigen::Vector3d::Zero();  // means of E' and 1, times xx, xy, yy
     const double share = 1.0 / (samples * samples);
     for (int k = 0; k < samples * samples; ++k) {
         const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
@@ -449,7 +451,6 @@ Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average
         seconds += share * xx;
     }
     if (all_alike) return {};
-    second -= mean[0] * seconds;
     // All in the axes n, s of the layers; strain is counted nn, ss, 2 ns.
     Eigen::Matrix3d turn;  // of strain, from x, y
     const double nx = normal.x(), ny = normal.y();
@@ -468,12 +469,39 @@ Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average
     contraction << first(1, 0) * along_x + first(1, 1) * along_y, first(2, 0) * along_x + first(2, 1) * along_y;
     // Mean of m S by x, y with moments m.
     const auto squares = [](const auto& x, const auto& y, const auto& stiffness, const Eigen::Vector3d& moments) {
-        const Eigen::Matrix2d across = x.transpose() * stiffness * y;
-        return Eigen::Matrix2d(moments[0] * x.transpose() * stiffness * x + moments[1] * (across + across.transpose()) +
-                               moments[2] * y.transpose() * stiffness * y);
+        const auto across = (x.transpose() * stiffness * y).eval();
+        return (moments[0] * x.transpose() * stiffness * x + moments[1] * (across + across.transpose()) +
+                moments[2] * y.transpose() * stiffness * y)
+            .eval();
     };
-    const Eigen::Matrix2d bending =
-        squares(along_x, along_y, Eigen::Matrix<double, 1, 1>(1.0), second) + squares(by_x, by_y, more, seconds);
+    Eigen::Matrix2d bending;
+    if (spread == Vec2::Ones()) {
+        // A whole cell's sides are free to curve: with q come strains a that vary linearly, those of e_xx by x, e_yy by y and 2
+        // e_xy by both, so that the energy is least. Their mean, weighted with E', is none: a strain that is the same all over
+        // the cell does not set them off. Without it, or with a the same for each wood, an oblique boundary makes the energy of
+        // some strain and q negative.
+        Eigen::Matrix<double, 3, 6> x = Eigen::Matrix<double, 3, 6>::Zero(), y = x;  // slopes of strain, by q and a
+        x.leftCols<2>() << 0, 0, 0, 1, 1, 0;
+        y.leftCols<2>() << 1, 0, 0, 0, 0, 1;
+        x(0, 2) = y(1, 3) = x(2, 4) = y(2, 5) = 1.0;
+        x = turn * x;
+        y = turn * y;
+        Eigen::Matrix<double, 3, 6> along;  // e_ss: slopes, and in the middle
+        along << x.row(1), y.row(1), Eigen::RowVector<double, 6>::Zero();
+        along.row(2).tail<4>() = -first.row(0) / mean[0] * along.topRightCorner<2, 4>();
+        Eigen::Matrix3d moments;
+        moments << second[0], second[1], first(0, 0), second[1], second[2], first(0, 1), first(0, 0), first(0, 1), mean[0];
+        Eigen::Matrix3d across = C;
+        across(1, 1) -= mean[0];
+        const Eigen::Matrix<double, 6, 6> all = along.transpose() * moments * along + squares(x, y, across, seconds);
+        const Eigen::Matrix<double, 4, 2> free = all.bottomRightCorner<4, 4>().ldlt().solve(all.bottomLeftCorner<4, 2>());
+        const Vec2 moduli = uniaxial_moduli(turn.transpose() * C * turn);
+        bending = all.topLeftCorner<2, 2>() - all.topRightCorner<2, 4>() * free;
+        bending.diagonal() -= Vec2(moduli.x() * seconds[2], moduli.y() * seconds[0]);
+    } else {
+        bending = squares(along_x, along_y, Eigen::Matrix<double, 1, 1>(1.0), Eigen::Vector3d(second - mean[0] * seconds)) +
+                  squares(by_x, by_y, more, seconds);
+    }
     Eigen::Matrix<double, 2, 3> tractions;  // nn and ns, of strain
     tractions << C.row(0), C.row(2);
     Eigen::Matrix<double, 3, 2> coupling = tractions.transpose() * contraction;

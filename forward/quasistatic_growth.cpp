@@ -113,9 +113,9 @@ int Quasistatic::next(int number, Step step, double now) {
     }
     const int added = add_place(number, step);
     places_[added].new_fields = std::move(fields);
-    if (plan_.linear && !know_linear(added)) return -1;
-    from.next[step] = added;
-    return added;
+    const int found = plan_.linear && !know_linear(added) ? -1 : added;
+    from.next[step] = found;  // the second grid must not be asked for the same place twice
+    return found;
 }
 
 // On the coarse grid: the same places in the same order.

@@ -3,6 +3,7 @@
 #include "forward/transition_wood.hpp"
 #include "tests/forward/scenes.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -284,6 +285,43 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
         plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress) - average.elasticity.stiffness();
     EXPECT_LT((left.stretch - early).norm(), 1e-12 * early.norm());
     EXPECT_TRUE(left.coupling.isZero(1e-12 * coupling.norm()) && left.bending.isZero(0.0));
+    // The whole cell, whose sides are free to curve: along the boundary that changes nothing.
+    const Unevenness whole = materials.unevenness(cell, average, {1.0, 1.0});
+    EXPECT_LT((spread * whole.coupling - coupling).norm(), 1e-9 * coupling.norm());
+    EXPECT_LT((spread * spread * whole.bending - bending).norm(), 1e-9 * bending.norm());
+}
+
+// Whatever strain and bending e, q there are in a whole cell, its energy e . S e / 2 + e . G q + q . H q / 2 is positive: of the
+// size that it would have if the wood were as soft as the softer one everywhere.
+TEST(UnitWood, AWholeCellOfTwoWoodsResistsAllItsMotions) {
+    const double h = 0.1e-3, E1 = 40e6;
+    for (const double contrast : {3.0, 30.0, 1000.0}) {
+        double least = INFINITY;
+        for (int turn = 0; turn < 36; ++turn) {
+            for (const double offset : {-0.5, -0.3, -0.1, 0.0, 0.2, 0.4}) {
+                const double angle = turn * M_PI / 18;
+                const Vec2 normal(std::cos(angle), std::sin(angle)), middle(0.45e-3, 0.55e-3);
+                Scene scene = two_woods(80, [&](const Vec2& x) { return normal.dot(x - middle) > offset * h; });
+                scene.materials["EW"].poisson_ratio = scene.materials["LW"].poisson_ratio = 0.33;
+                scene.materials["LW"].youngs_modulus = contrast * E1;
+                const MaterialMap materials(scene);
+                WoodArea cell{middle, Vec2::Constant(0.5 * h)};
+                const LocalWood average = materials.average(cell);
+                const Unevenness wood = materials.unevenness(cell, average, {1.0, 1.0});
+                const Eigen::Matrix3d S = average.elasticity.stiffness();
+                const Eigen::Matrix2d free_sides = h * h / 12 * uniaxial_moduli(S).asDiagonal();
+                Eigen::Matrix<double, 5, 5> energy, soft = Eigen::Matrix<double, 5, 5>::Zero();
+                energy << S, wood.coupling / h, wood.coupling.transpose() / h, (free_sides + wood.bending) / (h * h);
+                soft.topLeftCorner<3, 3>() = plane_stiffness(scene.materials.at("EW"), PlaneCondition::stress);
+                soft.bottomRightCorner<2, 2>() = E1 / 12 * Eigen::Matrix2d::Identity();
+                const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> against(energy, soft);
+                least = std::min(least, against.eigenvalues()[0]);
+            }
+        }
+        std::printf("whole cells of two woods %4.0f apart: the softest motion meets %.3f of what it does in the softer wood\n",
+                    contrast, least);
+        EXPECT_GT(least, 0.5);
+    }
 }
 
 }  // namespace
