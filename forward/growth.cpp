@@ -75,19 +75,21 @@ double hoop_stress_angle(const CrackTip& tip, const TipLoad& load, const Materia
     });
 }
 
-// Whether a tip lies so near a boundary across its way that K_I and K_II say little: within `reach`, ahead or behind, the wood is
-// more than twice as stiff as at the tip, or less than half. There K is that of cells of several woods, and vanishes or grows
-// without bound besides: crossing a photographed latewood band it has asked for turns of 40 degrees to either side within two
-// cells, where cells half as wide ask for none.
-bool crosses_other_wood(const CrackTip& tip, const MaterialMap& materials, double reach) {
+// Whether a tip lies so near a boundary that K_I and K_II say little: within `reach` ahead, behind or to a side the wood is more
+// than twice as stiff as at the tip, or less than half. There K is that of cells of several woods, and vanishes or grows without
+// bound besides: crossing a photographed latewood band it has asked for turns of 40 degrees to either side within two cells,
+// where cells half as wide ask for none; beside one it has turned cracks by 60 degrees into latewood, where they stood.
+bool near_other_wood(const CrackTip& tip, const MaterialMap& materials, double reach) {
     constexpr double most = 2.0;
     constexpr int samples = 8;  // to either side
     if (materials.homogeneous()) return false;
     const double here = materials.at(tip.position).plane_modulus();
-    for (int i = -samples; i <= samples; ++i) {
-        const double modulus = materials.at(tip.position + reach * i / samples * tip.direction).plane_modulus();
-        const bool is_wood = modulus > 0.0 && here > 0.0;  // a void is no other wood
-        if (is_wood && (modulus > most * here || most * modulus < here)) return true;
+    for (const Vec2& way : {tip.direction, left_of(tip.direction)}) {
+        for (int i = -samples; i <= samples; ++i) {
+            const double modulus = materials.at(tip.position + reach * i / samples * way).plane_modulus();
+            const bool is_wood = modulus > 0.0 && here > 0.0;  // a void is no other wood
+            if (is_wood && (modulus > most * here || most * modulus < here)) return true;
+        }
     }
     return false;
 }
@@ -139,7 +141,7 @@ double least_leg_in_cells(const CrackLine& line, bool at_end) {
 
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
                       double increment) {
-    if (steered_by_intensities(criterion) && crosses_other_wood(tip, materials, increment)) load.K_I = 1.0, load.K_II = 0.0;
+    if (steered_by_intensities(criterion) && near_other_wood(tip, materials, increment)) load.K_I = 1.0, load.K_II = 0.0;
     constexpr double rounding = 1e-7;  // [rad]; a crack on a line of symmetry, often one of the grid, would leave it by a hair
     const auto by_criterion = [&]() -> Vec2 {
         switch (criterion) {

@@ -22,8 +22,8 @@ bool steered_by_intensities(GrowthDirection criterion);
 double least_leg_in_cells(const CrackLine& line, bool at_end);
 
 /// Which way a crack tip goes on: a unit vector. The next `increment` [m] is what "energy release rate" weighs toughness over.
-/// Where the wood's stiffness more than doubles or halves within it along the crack's way, ahead or behind, a crack that K_I and
-/// K_II steer goes as in pure mode I: they mean little at a boundary.
+/// Where the wood's stiffness more than doubles or halves within it, ahead, behind or to a side, a crack that K_I and K_II steer
+/// goes as in pure mode I: they mean little at a boundary.
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
                       double increment);
 
