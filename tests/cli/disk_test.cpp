@@ -78,9 +78,6 @@ double apart(const Vec2& x, const std::vector<Vec2>& way) {
     return nearest;
 }
 
-// Each crack goes through, and cells half as wide show the same way to one and a half of the coarse cells, but for the last three
-// of these before it goes out, where the domain in which K steers it does not fit. Up to 4 mm turns of the wood count: by small
-// strain RT with cells of 0.1 mm may end beside latewood half a millimetre before the edge.
 class SlowDisk : public testing::Test {
   protected:
     void SetUp() override {
@@ -110,6 +107,8 @@ Cut along_rings(const char* offset) {
     return {"RT", offset, "top", "bottom", up_mm_min, R"([["0 mm", "6.3 mm"], ["3 mm", "6.3 mm"]])"};
 }
 
+// Each crack goes through, and cells half as wide show the same way to one and a half of the coarse cells, but for the last three
+// of these before it goes out, where the domain in which K steers it does not fit.
 TEST_F(SlowDisk, ScenesCutFromItSplit) {
     const char* offset = R"(["-12 mm", "-10 mm"])";
     const Cut cuts[] = {{"TR+", offset, "right", "left", right_mm_min, R"([["6 mm", "12 mm"], ["6 mm", "9 mm"]])"},

@@ -320,7 +320,7 @@ TEST(UnitWood, AWholeCellOfTwoWoodsResistsAllItsMotions) {
         }
         std::printf("whole cells of two woods %4.0f apart: the softest motion meets %.3f of what it does in the softer wood\n",
                     contrast, least);
-        EXPECT_GT(least, 0.5);
+        EXPECT_GT(least, 0.5);  // above 0 it must be; strains of the cell's own may take a little of it
     }
 }
 
