@@ -74,8 +74,8 @@ class MaterialMap {
     /// Of a full rectangle in a cell of this `average`; all zero where its wood is the average's. Layers share the strain along
     /// them, wherever they lie, and the tractions between them are those of the mean strain: the part that q stretches along the
     /// layers feels the moments of E', r and p (`LayeredElasticity`), the rest the average. Places count with their distance from
-    /// the middle times `spread`, so that the points which integrate the average have the same second moment. With a spread of 1 it
-    /// is a whole cell, whose average resists q by its `uniaxial_moduli` alone, with sides free to curve.
+    /// the middle times `spread`, so that the points which integrate the average have the same second moment. With a spread of 1
+    /// it is a whole cell, whose average resists q by its `uniaxial_moduli` alone, with sides free to curve.
     Unevenness unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const;
 
     bool homogeneous() const { return homogeneous_; }

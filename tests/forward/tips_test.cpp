@@ -176,7 +176,8 @@ TEST(UnitGrowthDirection, CountsFromTheCrackAhead) {
     }
 }
 
-// A tip in stiff or soft wood that heeds K only so far from a boundary, across its way or along it; K_I = K_II ask for 53 degrees.
+// A tip in stiff or soft wood that heeds K only so far from a boundary, across its way or along it; K_I = K_II ask for 53
+// degrees.
 TEST(UnitGrowthDirection, NearBoundariesTheWayIsStraight) {
     Scene scene = block({10e-3, 10e-3}, 1e-3);
     scene.specimen.material.clear();
