@@ -172,8 +172,8 @@ TEST(VerificationOrthotropicPatch, StressOnTheSidesStrainsAsTheTurnedComplianceS
 }
 
 TEST(VerificationOrthotropicPatch, StressOutOfThePlane) {
-    const MaterialMap map(plate(30 * degree, PlaneCondition::strain));
     const Scene scene = plate(30 * degree, PlaneCondition::strain);
+    const MaterialMap map(scene);
     const Discretisation body(scene, map);
     // Pulled along R by 1 Pa: nu_LR along L; along T: nu_LT.
     const auto out = [&](const Vec2& n) {
