@@ -23,26 +23,23 @@ void UnevenCells::sort() {
     const Points& points = body_.points;
     const int side = body_.layout.per_side;
     pieces_.clear();
-    std::vector<bool> taken(side * side);
     for (const Discretisation::UnevenCell& cell : body_.uneven_cells) {
         if (history_ && history_->is_in(cell.cell)) continue;
         const int first = points.first_of_cell[cell.cell];
-        std::fill(taken.begin(), taken.end(), false);
         for (int start = 0; start < side * side; ++start) {
-            if (taken[start]) continue;
-            const auto goes_along = [&](int x, int y) {
-                return !taken[y * side + x] && points.node.same(first + start, first + y * side + x);
-            };
-            PointBox box{start % side, start / side, start % side + 1, start / side + 1};
-            while (box.to_x < side && goes_along(box.to_x, box.from_y)) ++box.to_x;
-            const auto row_goes_along = [&](int y) {
-                bool all = true;
-                for (int x = box.from_x; x < box.to_x; ++x) all = all && goes_along(x, y);
-                return all;
-            };
-            while (box.to_y < side && row_goes_along(box.to_y)) ++box.to_y;
-            for (int y = box.from_y; y < box.to_y; ++y)
-                for (int x = box.from_x; x < box.to_x; ++x) taken[y * side + x] = true;
+            // All points on the same fields, if they are a rectangle: else each by itself, so that a mirrored scene is cut alike.
+            PointBox box{side, side, 0, 0};
+            int count = 0, least = side * side;
+            for (int k = 0; k < side * side; ++k) {
+                if (!points.node.same(first + start, first + k)) continue;
+                box = {std::min(box.from_x, k % side), std::min(box.from_y, k / side), std::max(box.to_x, k % side + 1),
+                       std::max(box.to_y, k / side + 1)};
+                least = std::min(least, k);
+                ++count;
+            }
+            const bool is_rectangle = count == (box.to_x - box.from_x) * (box.to_y - box.from_y);
+            if (is_rectangle && start > least) continue;
+            if (!is_rectangle) box = {start % side, start / side, start % side + 1, start / side + 1};
             pieces_.push_back({cell.cell, first + start, box, &wood_of(cell, box)});
         }
     }
