@@ -40,18 +40,26 @@ std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
 
 }  // namespace
 
-int GridView::point_beside(const Vec2& x) const {
+std::vector<int> GridView::points_about(const Vec2& x) const {
+    const int found = body.point_at(x);
+    if (found >= 0 && cracks.is_left(crack, body.points.position[found]) == cracks.is_left(crack, x)) return {found};
+    return {};
+}
+
+std::vector<int> GridView::points_beside(const Vec2& x, const Vec2& node) const {
     const bool left = cracks.is_left(crack, x);
-    int nearest = body.point_at(x);
-    if (nearest >= 0 && cracks.is_left(crack, body.points.position[nearest]) == left) return nearest;  // most often
-    nearest = -1;
+    const double as_near = 1e-6 * body.layout.cell.minCoeff();
+    std::vector<int> nearest;
     double least = INFINITY;
     body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
+        const Vec2 low = body.layout.cell_corner(c), high = low + body.layout.cell;
+        const double beyond = 1e3 * (node.cwiseMax(low).cwiseMin(high) - node).norm();
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
-            const double distance = (body.points.position[p] - x).squaredNorm();
-            if (distance >= least || cracks.is_left(crack, body.points.position[p]) != left) continue;
-            least = distance;
-            nearest = p;
+            const double distance = beyond + (body.points.position[p] - x).norm();
+            if (distance > least + as_near || cracks.is_left(crack, body.points.position[p]) != left) continue;
+            if (distance < least - as_near) nearest.clear();
+            least = std::min(least, distance);
+            nearest.push_back(p);
         }
     });
     return nearest;
@@ -135,25 +143,38 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
     // All else follows, but crack faces that begin closed would count as closed.
     for (const FieldPair& pair : cracks.pairs) unknown[pair.left] = unknown[pair.right] = true;
     if (solved_there) unknown.assign(cracks.fields(), true);
-    std::vector<Vec2> displacement(cracks.fields(), Vec2::Zero());
     const Vec2 shift = wood_->box.low - from.origin;
     const int nodes = layout.nodes_per_cell();
-    for (int p = 0; p < cracked_.points.count(); ++p) {
-        for (const int field : cracked_.points.node[p].first(nodes)) {
-            if (!unknown[field]) continue;
-            unknown[field] = false;  // once is enough
-            // As the wood beside the node moves, on its side of the crack.
-            const Vec2 place = cracked_.points.position[p] + shift;
-            const int other = solved_there ? from.body.point_at(place) : from.point_beside(place);
-            if (other < 0) return false;
-            const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
-            Hold hold{field, {}, from.body.values_at(from.body.points.cell[other], x)};
-            for (int k = 0; k < nodes; ++k) {
-                hold.from[k] = from.body.points.node[other][k];
-                displacement[field] += hold.weight[k] * from.displacement[hold.from[k]];
+    std::vector<int> count(cracks.fields(), 0);
+    std::vector<Hold> holds;
+    // As the wood beside the node moves, on its side of the crack: of all points around it, so that a mirrored scene is held
+    // alike.
+    const auto take = [&](const auto& find_points) {
+        for (int p = 0; p < cracked_.points.count(); ++p) {
+            for (const int field : cracked_.points.node[p].first(nodes)) {
+                if (!unknown[field] || (solved_there && count[field] > 0)) continue;  // all say the same there
+                const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
+                for (const int other : find_points(cracked_.points.position[p] + shift, x)) {
+                    holds.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
+                    std::copy_n(from.body.points.node[other].begin(), nodes, holds.back().from.begin());
+                    ++count[field];
+                }
             }
-            if (solved_there || is_held[field]) taken_.push_back(hold);
         }
+        for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
+    };
+    take([&](const Vec2& place, const Vec2&) { return from.points_about(place); });
+    take([&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
+    for (int p = 0; p < cracked_.points.count(); ++p)
+        for (const int field : cracked_.points.node[p].first(nodes))
+            if (unknown[field]) return false;
+    std::vector<Vec2> displacement(cracks.fields(), Vec2::Zero());
+    for (Hold& hold : holds) {
+        for (int k = 0; k < nodes; ++k) {
+            hold.weight[k] /= count[hold.field];
+            displacement[hold.field] += hold.weight[k] * from.displacement[hold.from[k]];
+        }
+        if (solved_there || is_held[hold.field]) taken_.push_back(hold);
     }
     if (!solved_there) return equilibrium_->relax(displacement);
     equilibrium_->set_displacements(displacement, 0.0);

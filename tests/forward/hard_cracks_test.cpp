@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 
 namespace crampfit::test {
@@ -299,6 +300,59 @@ TEST(HardTwoCracks, NearlyMeeting) {
         hard_case(name, "exact G of the outer tips", outer.G / G_outer - 1, 0.02);
         if (gap > 1) hard_case(name, "exact G of the inner tips", inner.G / G_inner - 1, gap >= 5 ? 0.02 : 0.2);
         hard_case(name, "mirror symmetry of G", mirror.G / inner.G - 1, 1e-6);
+    }
+}
+
+// Rings of two woods 30 : 1, an oblique crack that crosses them, as a turn or a mirror that keeps grid lines shows the scene.
+Scene crack_through_rings(const Mat2& image, GrowthDirection direction) {
+    const Vec2 size(8e-3, 6e-3);
+    const auto seen = [&](const Vec2& x) -> Vec2 { return image * (x - 0.5 * size) + 0.5 * (image * size).cwiseAbs(); };
+    Scene scene = at_equilibrium(block((image * size).cwiseAbs(), 0.2e-3));
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{seen({1.03e-3, -1.91e-3}), 1.82e-3, 0.41, 0.3e-3};
+    scene.materials["EW"] = {360e6, 0.33, 300.0, 100.0};
+    scene.materials["LW"] = {10800e6, 0.33, 300.0, 115.0};
+    const Vec2 up = image * Vec2(0, 1);
+    const auto side_to = [](const Vec2& normal) {
+        if (std::abs(normal.x()) > 0.5) return normal.x() > 0 ? Side::right : Side::left;
+        return normal.y() > 0 ? Side::top : Side::bottom;
+    };
+    scene.edges = {moving("grip", side_to(up), 1e-5 * up), moving("hold", side_to(-up), Vec2::Zero())};
+    Crack crack;
+    crack.points = {seen({0.0, 2.63e-3}), seen({1.61e-3, 3.0e-3})};
+    crack.grows = Growth::end;
+    crack.advance = 0.2e-3;
+    crack.direction = direction;
+    scene.cracks = {crack};
+    scene.measure = {"grip", "grip"};
+    scene.stop.crack_length = 4.5e-3;
+    return scene;
+}
+
+TEST(HardMirror, CrackThroughRingsGoesTheSameWay) {
+    const std::map<std::string, Mat2> images{{"mirrored in x", Mat2{{-1, 0}, {0, 1}}},
+                                             {"mirrored in y", Mat2{{1, 0}, {0, -1}}},
+                                             {"turned by 90 degrees", Mat2{{0, -1}, {1, 0}}}};
+    for (const auto& [direction, name] : {std::pair{GrowthDirection::normal_to_opening, "normal to opening"},
+                                          std::pair{GrowthDirection::energy_release_rate, "energy release rate"}}) {
+        const Scene scene = crack_through_rings(Mat2::Identity(), direction);
+        const Record record = simulate(scene);
+        ASSERT_GT(record.driving.size(), 50);
+        for (const auto& [what, image] : images) {
+            const Scene other = crack_through_rings(image, direction);
+            const Record seen = simulate(other);
+            ASSERT_EQ(seen.driving.size(), record.driving.size());
+            double load = 0.0, place = 0.0;
+            for (std::size_t k = 0; k < record.driving.size(); ++k) {
+                const Vec2 off =
+                    image.transpose() * (seen.driving[k].tip - 0.5 * other.specimen.size) + 0.5 * scene.specimen.size;
+                load = std::max(load, std::abs(seen.driving[k].force / record.driving[k].force - 1));
+                place = std::max(place, (off - record.driving[k].tip).norm() / scene.model.cell);
+            }
+            const std::string title = fmt::format("rings 30 : 1, {}, {}", name, what);
+            hard_case(title, "the loads that carry the crack on, over 3 mm: worst", load, 1e-9);
+            hard_case(title, "its way, in cells: worst", place, 1e-9);
+        }
     }
 }
 
