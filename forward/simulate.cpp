@@ -164,6 +164,50 @@ void end_at_sides(const Scene& scene, Record& record) {
         }
 }
 
+// Whether a piece of a crack is one that the scene drew.
+bool is_drawn(const Crack& crack, const Vec2& from, const Vec2& to) {
+    const Vec2 middle = 0.5 * (from + to);
+    for (std::size_t k = 0; k + 1 < crack.points.size(); ++k) {
+        const Vec2 along = crack.points[k + 1] - crack.points[k];
+        const Vec2 nearest = crack.points[k] + nearest_on_segment(crack.points[k], crack.points[k + 1], middle) * along;
+        if ((nearest - middle).norm() < 1e-6 * along.norm()) return true;
+    }
+    return false;
+}
+
+// Says so where a crack has grown alongside a held side within a cell of it: there it would have to cut wood off what holds it,
+// and the grid cannot tell what load that takes.
+void judge_held_sides(const Scene& scene, Record& record) {
+    constexpr double counts = 1.2;  // cells of way; what comes straight to the side has one
+    for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
+        if (scene.cracks[k].grows == Growth::none) continue;
+        for (const Edge& edge : scene.edges) {
+            const int across = edge.side == Side::top || edge.side == Side::bottom ? 1 : 0;
+            if (!edge.velocity[across]) continue;
+            const bool high = edge.side == Side::top || edge.side == Side::right;
+            const double side = high ? scene.specimen.size[across] : 0.0;
+            const auto is_close = [&](const Vec2& x) {
+                const double along = x[1 - across];
+                const bool beside = !edge.range || (along >= edge.range->first && along <= edge.range->second);
+                return beside && std::abs(x[across] - side) < scene.model.cell;
+            };
+            const std::vector<Vec2>& path = record.paths[k];
+            double way = 0.0;
+            std::optional<Vec2> first;
+            for (std::size_t j = 0; j + 1 < path.size(); ++j) {
+                if (!is_close(path[j]) || !is_close(path[j + 1]) || is_drawn(scene.cracks[k], path[j], path[j + 1])) continue;
+                if (!first) first = path[j];
+                way += (path[j + 1] - path[j]).norm();
+            }
+            if (way > counts * scene.model.cell)
+                record.message +=
+                    fmt::format("; cracks.{} has grown {:.3g} mm within a cell of edge \"{}\", which holds the wood, "
+                                "about x = {:.4g}, y = {:.4g} mm: the load there is the grid's",
+                                k, 1e3 * way, edge.name, 1e3 * first->x(), 1e3 * first->y());
+        }
+    }
+}
+
 // Says so where the energy books do not close, as they do to a hundredth on any scene that the grid resolves.
 void judge_books(Record& record) {
     constexpr double counts = 0.05;
@@ -263,6 +307,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
                     : plan.remembers  ? run_in_time(scene, plan, materials, body, options)
                                       : run_quasistatic(scene, plan, materials, body, options);
     end_at_sides(scene, record);
+    judge_held_sides(scene, record);
     record.scene_text = scene.text;
     record.explanation = describe(scene, plan, body);
     if (!plan.quasistatic)

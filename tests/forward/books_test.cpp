@@ -264,6 +264,24 @@ TEST(UnitPlan, AnEdgeThatStopsEndsNoRunByItsDisplacement) {
     }
 }
 
+TEST(UnitRecord, SaysThatACrackGrowsAlongsideAHeldSide) {
+    for (const double height : {0.15e-3, 0.35e-3}) {  // less than a cell of 0.2 mm, and more
+        for (const double drawn : {1.0e-3, 5.0e-3}) {
+            Scene scene = at_equilibrium(block({6e-3, 4e-3}, 0.2e-3));
+            scene.edges = {moving("grip", Side::top, {0.0, 1e-5}), moving("bed", Side::bottom, {0.0, 0.0})};
+            Crack crack;
+            crack.points = {Vec2(0.0, height), Vec2(drawn, height)};
+            crack.grows = Growth::end;
+            crack.direction = GrowthDirection::straight;
+            scene.cracks = {crack};
+            scene.measure = {"grip", "grip"};
+            scene.stop.crack_length = drawn + 0.5e-3;
+            const std::string message = simulate(scene).message;
+            EXPECT_EQ(message.find("within a cell of edge \"bed\"") != std::string::npos, height < 0.2e-3) << message;
+        }
+    }
+}
+
 // A cantilever that a traction bends far: small strain, which nothing prescribed speaks against, is told of; finite rotation is
 // not.
 TEST(UnitRecord, SaysThatWoodHasTurnedFarForSmallStrain) {
