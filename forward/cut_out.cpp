@@ -147,12 +147,12 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
     const int nodes = layout.nodes_per_cell();
     std::vector<int> count(cracks.fields(), 0);
     std::vector<Hold> holds;
-    // As the wood beside the node moves, on its side of the crack: of all points around it, so that a mirrored scene is held
-    // alike.
-    const auto take = [&](const auto& find_points) {
+    // As the wood beside the node moves, on its side of the crack. Points whose own wood the other grid has there all say the
+    // same; of those for which it is looked for beside all count, so that a mirrored scene is held alike.
+    const auto take = [&](bool once, const auto& find_points) {
         for (int p = 0; p < cracked_.points.count(); ++p) {
             for (const int field : cracked_.points.node[p].first(nodes)) {
-                if (!unknown[field] || (solved_there && count[field] > 0)) continue;  // all say the same there
+                if (!unknown[field] || (once && count[field] > 0)) continue;
                 const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
                 for (const int other : find_points(cracked_.points.position[p] + shift, x)) {
                     holds.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
@@ -163,8 +163,8 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
         }
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
-    take([&](const Vec2& place, const Vec2&) { return from.points_about(place); });
-    take([&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
+    take(true, [&](const Vec2& place, const Vec2&) { return from.points_about(place); });
+    take(false, [&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
     for (int p = 0; p < cracked_.points.count(); ++p)
         for (const int field : cracked_.points.node[p].first(nodes))
             if (unknown[field]) return false;
