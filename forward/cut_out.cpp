@@ -47,13 +47,14 @@ std::vector<int> GridView::points_about(const Vec2& x) const {
 }
 
 std::vector<int> GridView::points_beside(const Vec2& x, const Vec2& node) const {
+    constexpr double more_than_any_distance = 1e3;  // what a cell is off the node counts before what a point is off x
     const bool left = cracks.is_left(crack, x);
     const double as_near = 1e-6 * body.layout.cell.minCoeff();
     std::vector<int> nearest;
     double least = INFINITY;
     body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
         const Vec2 low = body.layout.cell_corner(c), high = low + body.layout.cell;
-        const double beyond = 1e3 * (node.cwiseMax(low).cwiseMin(high) - node).norm();
+        const double beyond = more_than_any_distance * (node.cwiseMax(low).cwiseMin(high) - node).norm();
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
             const double distance = beyond + (body.points.position[p] - x).norm();
             if (distance > least + as_near || cracks.is_left(crack, body.points.position[p]) != left) continue;

@@ -306,11 +306,12 @@ TEST(HardTwoCracks, NearlyMeeting) {
 
 // A crack from the left side through rings of two woods.
 struct RingScene {
-    Vec2 pith{1.03e-3, -1.91e-3};                         // [m]
-    double period = 1.82e-3;                              // [m]
-    double contrast = 30;                                 // of the moduli
-    double transition = 0.3e-3;                           // [m]
-    Vec2 mouth{0.0, 2.63e-3}, tip = Vec2(1.61e-3, 3e-3);  // of the crack [m]
+    Vec2 size{8e-3, 6e-3};                         // of the specimen [m]
+    Vec2 pith{1.03e-3, -1.91e-3};                  // [m]
+    double period = 1.82e-3;                       // [m]
+    double contrast = 30;                          // of the moduli
+    double transition = 0.3e-3;                    // [m]
+    Vec2 mouth{0.0, 2.63e-3}, tip{1.61e-3, 3e-3};  // of the crack [m]
     GrowthDirection direction = GrowthDirection::normal_to_opening;
 
     // As a turn or a mirror that keeps grid lines shows it.
@@ -337,8 +338,6 @@ struct RingScene {
         scene.stop.crack_length = 4.5e-3;
         return scene;
     }
-
-    Vec2 size{8e-3, 6e-3};  // of the specimen [m]
 };
 
 // Loads and the way of a crack in the images of a scene.
