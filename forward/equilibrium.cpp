@@ -39,6 +39,7 @@ constexpr double worth_keeping_with_friction = 0.25;
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
 constexpr int sorting = 6;       // iterations without an end after which faces that rub are sorted into those that grip and slide
+constexpr int most_changes = 3;  // in iterations after these, between apart and pressed, of faces that stick
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -126,12 +127,33 @@ void Equilibrium::find_pieces(bool crumbs_only) {
     pieces_ = find_loose_pieces(body_, cracks_, boundary_, mass, heaviest);
 }
 
+bool Equilibrium::is_closed(const FieldPair& pair) const {
+    return (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal) < 0.0;
+}
+
 Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
-    const double gap = (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal);
-    if (gap >= 0.0 || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
+    if (!is_closed(pair) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
     const double stiffness = closed_stiffness(pair);
-    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick) return stiffness * Mat2::Identity();
+    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick && !slips(pair)) return stiffness * Mat2::Identity();
     return stiffness * pair.normal * pair.normal.transpose();
+}
+
+bool Equilibrium::slips(const FieldPair& pair) const {
+    const auto number = static_cast<std::size_t>(&pair - cracks_.pairs.data());
+    return number < slips_.size() && slips_[number];
+}
+
+// Faces that stick and have slid past each other before they met may overlap while they are free and part as soon as they are
+// pulled back: they have met where they are, and press without holding. Whether some are found that do, among pairs that were
+// closed or not one iteration ago.
+bool Equilibrium::let_slip(std::vector<char>& closed, std::vector<int>& changes) {
+    bool some = false;
+    for (std::size_t k = 0; k < closed.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        if (scene_.cracks[pair.crack].faces.kind != CrackFaces::Kind::stick || slips_[k]) continue;
+        if (std::exchange(closed[k], is_closed(pair)) != closed[k] && ++changes[k] > most_changes) slips_[k] = some = true;
+    }
+    return some;
 }
 
 // Ties stand for wood about a tip, or about the end of a held stretch, that no cell resolves. Where that has relaxed or flows,
@@ -499,6 +521,10 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             if (hinges_.size() == most_hinges || !hold_hinge()) return false;
         return std::ranges::none_of(hinges_, [&](int hinge) { return moves_most(hinge); });
     };
+    const std::size_t pairs = cracks_.pairs.size();
+    slips_.assign(pairs, false);
+    std::vector<char> closed(pairs, false);
+    std::vector<int> changes(pairs, 0);
     find_forces();
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
@@ -533,6 +559,12 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             return Outcome::solved;
         }
         if (iteration >= quick_iterations) slack = 0.0;
+        if (iteration >= sorting && let_slip(closed, changes)) {
+            find_forces();
+            residual = largest_residual();
+            renew = true;
+            continue;
+        }
         if (!settled_.empty() && iteration % sorting == sorting - 1 && sort_out_faces()) {
             residual = largest_residual();
             renew = true;

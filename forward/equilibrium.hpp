@@ -107,6 +107,7 @@ class Equilibrium {
         History::State history;                 // of wood that remembers
         std::vector<double> kept;               // [fields] of stiffness by that wood
         double lost_by_ties;                    // with what it did not keep [J]
+        std::vector<char> slips;                // [pairs] faces that stick elsewhere
     };
     Contacts contacts() const;
 
@@ -167,7 +168,10 @@ class Equilibrium {
     double tie_of(const FieldPair& pair) const;
     double tie_of(const Boundary::Tied& tie) const { return kept(tie.field) * tie.stiffness; }
     Mat2 pair_stiffness(const FieldPair& pair) const;
+    bool is_closed(const FieldPair& pair) const;
     Mat2 face_stiffness(const FieldPair& pair) const;
+    bool slips(const FieldPair& pair) const;
+    bool let_slip(std::vector<char>& closed, std::vector<int>& changes);
     double closed_stiffness(const FieldPair& pair) const;
     Vec2 place_of(int driver) const { return boundary_.travel(driver, time_) + moved_[driver]; }  // how far it has come [m]
     double lag(const Boundary::Tied& tie) const { return place_of(tie.driver)[tie.axis] - displacement_[tie.field][tie.axis]; }
@@ -232,6 +236,7 @@ class Equilibrium {
     std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis
     std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
+    std::vector<char> slips_;                        // [pairs, or fewer] faces that stick elsewhere
     std::vector<Mat2> pair_stiffness_;               // [pairs] as last factored [N/m]
     std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
     std::vector<double> prescribed_step_;            // [2 x fields] what prescribed components still have to go [m]

@@ -371,7 +371,7 @@ double Equilibrium::dissipated() const {
 }
 
 Equilibrium::Contacts Equilibrium::contacts() const {
-    Contacts contacts{moved_, {}, face_grips_, {}, {}, {}, 0.0};
+    Contacts contacts{moved_, {}, face_grips_, {}, {}, {}, 0.0, slips_};
     for (const SlidingBody& body : sliding_) {
         contacts.bodies.push_back(body.grips());
         contacts.dissipated.push_back(body.dissipated());
@@ -387,6 +387,7 @@ void Equilibrium::set_contacts(const Contacts& contacts) {
     if (history_) history_->restore(contacts.history);
     kept_ = contacts.kept;
     lost_by_ties_ = contacts.lost_by_ties;
+    slips_ = contacts.slips;
     const bool at_start = contacts.moved.empty();
     moved_ = at_start ? seat_ : contacts.moved;
     for (std::size_t i = 0; i < sliding_.size(); ++i)

@@ -107,17 +107,23 @@ Box box_around(const Box& way, double half_width, double pitch, const Vec2& cell
             (pitch * cell.array() * high.floor()).matrix().cwiseMin(within.high)};
 }
 
-// Whether no body acts on a box inside, and no crack but this one runs through it.
-bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box) {
+// Whether no body acts on a box inside, and no crack but this one comes, or is to come, within a cell of it: it would part nodes
+// of the outline.
+bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box, const Vec2& cell,
+                  std::span<const TipWay> others) {
+    constexpr double hair = 1e-6;
     for (const Body& rigid : scene.bodies) {
         const auto* circle = std::get_if<Circle>(&rigid.shape);
         if (!box.touches(bounds(rigid.shape))) continue;
         if (!circle || (circle->centre.cwiseMax(box.low).cwiseMin(box.high) - circle->centre).norm() <= circle->radius)
             return false;
     }
+    const Box about{box.low - (1.0 + hair) * cell, box.high + (1.0 + hair) * cell};
     for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k)
-        if (k != crack && cracks.lines[k].comes_to(box)) return false;
-    return true;
+        if (k != crack && cracks.lines[k].comes_to(about)) return false;
+    return std::ranges::none_of(others, [&](const TipWay& way) {
+        return way.crack != crack && about.touches({way.from.cwiseMin(way.to), way.from.cwiseMax(way.to)});
+    });
 }
 
 // Whether a body, where it has come to, presses on the wood in a box. Beside the outline, which is held, it may: within a cell.
@@ -203,7 +209,8 @@ FineTip::FineTip(const Scene& scene, const Plan& plan, const MaterialMap& materi
     small_.linear = true;
 }
 
-std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, const Vec2& from, const Vec2& to) const {
+std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, const TipWay& tip, std::span<const TipWay> others) const {
+    const auto& [crack, from, to] = tip;
     const Nearest nearest = nearest_boundary(body_, from, to);
     if (nearest.way >= far) return std::nullopt;
     const bool is_close = nearest.ends <= close_by;
@@ -214,7 +221,7 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, int crack, con
     Vec2 cell = body_.layout.cell;
     for (std::size_t k = is_close ? 0 : 1; k < outermost_half_widths.size(); ++k) {
         const Box outermost = box_around(way, outermost_half_widths[k], pitches[0], cell, {Vec2::Zero(), size});
-        if (!stands_alone(scene_, cracks, crack, outermost)) continue;
+        if (!stands_alone(scene_, cracks, crack, outermost, cell, others)) continue;
         TipBoxes found{{outermost}, std::min(1.0, (far - nearest.way) / (far - near))};
         for (const double half_width : inner)
             found.boxes.push_back(box_around(way, half_width, pitches[found.boxes.size()], cell *= 0.5, found.boxes.back()));
@@ -252,7 +259,8 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    if (opening <= 0.0 || touches_itself(body_, place.boxes[0], equilibrium, crack) ||
+    if (opening <= 0.0 || !stands_alone(scene_, cracks, crack, place.boxes[0], body_.layout.cell, {}) ||
+        touches_itself(body_, place.boxes[0], equilibrium, crack) ||
         is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies))
         return {};
 

@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <span>
 
 namespace crampfit {
 
@@ -14,6 +15,12 @@ struct MissedEnergy {
     std::vector<double> by_number;  // its slope by the numbers, the grid's displacements as they are [J / unit]
     std::vector<Vec2>
         by_displacement;  // and by the displacements of the grid's fields [N]; empty like `by_number` where none is asked for
+};
+
+/// The way of a crack's tip over an advance.
+struct TipWay {
+    int crack;
+    Vec2 from, to;
 };
 
 /// Boxes about the way of a tip over an advance, one within the other.
@@ -41,11 +48,11 @@ class FineTip {
             const std::vector<MaterialSlope>& numbers);
 
     /// Boxes for a tip on the way from one place to another. None where no sharp boundary lies within 4 cells of the way, nor
-    /// where there is no room for them among bodies and other cracks.
-    std::optional<TipBoxes> about(const CrackFields& cracks, int crack, const Vec2& from, const Vec2& to) const;
+    /// where there is no room for them among bodies, other cracks and the ways of their tips.
+    std::optional<TipBoxes> about(const CrackFields& cracks, const TipWay& way, std::span<const TipWay> others = {}) const;
 
-    /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing. With its slopes by the numbers, or
-    /// without.
+    /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing, nor where
+    /// another crack has come into the boxes. With its slopes by the numbers, or without.
     MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
 
   private:

@@ -102,13 +102,15 @@ bool Quasistatic::fail() {
 // Boxes about the tips whose next advance counts, as if they went straight on.
 std::vector<std::optional<TipBoxes>> Quasistatic::boxes_ahead() const {
     std::vector<std::optional<TipBoxes>> boxes(growing_.size());
-    for (std::size_t t = 0; t < growing_.size() && !plan_.remembers; ++t) {
-        const auto& [crack, at_end, increment, ahead] = growing_[t];
+    if (plan_.remembers) return boxes;
+    std::vector<TipWay> ways;
+    for (const auto& [crack, at_end, increment, ahead] : growing_) {
         const CrackTip& tip = equilibrium_.cracks().lines[crack].tip(at_end);
-        if (ahead == 0 || !tip.inside) continue;
-        boxes[t] = fine_tip_.about(equilibrium_.cracks(), crack, tip.position,
-                                   tip.position + static_cast<double>(ahead) * increment * tip.direction);
+        const double length = tip.inside ? static_cast<double>(std::max<std::size_t>(1, ahead)) * increment : 0.0;
+        ways.push_back({crack, tip.position, tip.position + length * tip.direction});
     }
+    for (std::size_t t = 0; t < growing_.size(); ++t)
+        if (growing_[t].ahead > 0 && ways[t].from != ways[t].to) boxes[t] = fine_tip_.about(equilibrium_.cracks(), ways[t], ways);
     return boxes;
 }
 
@@ -288,8 +290,8 @@ std::vector<Vec2> Quasistatic::handed_on(int from, const std::vector<Vec2>& befo
     return displacement;
 }
 
-// From one time to another much changes about bodies that slide, but it changes alike at the places before, and at those beside it
-// that the crack has been tried to go on to from there: what the nearest that knows both times has gone between them, on the
+// From one time to another much changes about bodies that slide, but it changes alike at the places before, and at those beside
+// it that the crack has been tried to go on to from there: what the nearest that knows both times has gone between them, on the
 // fields of this place; where it begins is a time that `known` has.
 std::optional<Quasistatic::Way> Quasistatic::way_to(int number, int time, const std::map<int, Known>& known) const {
     int place = -1, from = 0, before = number;
@@ -426,6 +428,8 @@ void Quasistatic::forget_guesses() {
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
     Place& place = places_[number];
+    const std::size_t known = place.known.size() + (place.parent >= 0 ? places_[place.parent].known.size() : 0);
+    if (const auto tried = place.failed.find(time); tried != place.failed.end() && tried->second == known) return false;
     const bool at_rest = time == 0 && !equilibrium_.boundary().has_dead_load();
     const auto [second, good] =
         on_both_grids([&] { return coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time); },
@@ -444,7 +448,10 @@ bool Quasistatic::find(std::size_t number, int time) {
         keep_probes(number, time);
         return true;
     }
-    if (!parted(number)) return false;
+    if (!parted(number)) {
+        place.failed[time] = known;
+        return false;
+    }
     keep(number, time, nothing(time_of(time)));
     return true;
 }

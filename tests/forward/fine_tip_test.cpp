@@ -19,7 +19,7 @@ MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numb
                        double way = 0.0) {
     FineTip fine_tip(run.scene, run.plan, run.materials, run.body, numbers);
     if (!from) from = run.equilibrium.cracks().lines[0].end.position;
-    const auto boxes = fine_tip.about(run.equilibrium.cracks(), 0, *from, *from + Vec2(way, 0.0));
+    const auto boxes = fine_tip.about(run.equilibrium.cracks(), {0, *from, *from + Vec2(way, 0.0)});
     return boxes ? fine_tip.missed(*boxes, run.equilibrium, 0, true, !numbers.empty()) : MissedEnergy{};
 }
 
@@ -157,7 +157,7 @@ TEST(UnitFineTip, BoxesKeepClearOfWheels) {
         scene.bodies = {wheel};
         const std::vector<MaterialSlope> none;
         const Vec2 tip = run.equilibrium.cracks().lines[0].end.position;
-        const auto boxes = FineTip(scene, run.plan, run.materials, run.body, none).about(run.equilibrium.cracks(), 0, tip, tip);
+        const auto boxes = FineTip(scene, run.plan, run.materials, run.body, none).about(run.equilibrium.cracks(), {0, tip, tip});
         return boxes ? boxes->boxes[0].high.y() : 0.0;
     };
     // A tip this near to a boundary calls for 8 cells, up to 2.8 mm; less room makes the box narrower, and then there is none.
@@ -173,7 +173,7 @@ TEST(UnitFineTip, BoxesThatTakeACrackAlongAreAsMadeAnew) {
     AtRest run(two_woods(2.025e-3, 1.8e-3, 0.1e-3));
     const std::vector<MaterialSlope> numbers = MaterialSlope::of(run.scene, {"materials.EW.E"}, run.body);
     FineTip kept(run.scene, run.plan, run.materials, run.body, numbers);
-    const auto boxes = kept.about(run.equilibrium.cracks(), 0, {1.8e-3, 2e-3}, {2.0e-3, 2e-3});
+    const auto boxes = kept.about(run.equilibrium.cracks(), {0, {1.8e-3, 2e-3}, {2.0e-3, 2e-3}});
     ASSERT_TRUE(boxes);
     for (const Vec2& tip : {Vec2(1.85e-3, 2e-3), Vec2(1.9e-3, 2.005e-3), Vec2(1.95e-3, 2.005e-3), Vec2(2.05e-3, 2.0e-3)}) {
         run.equilibrium.grow(0, true, tip);
