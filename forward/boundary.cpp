@@ -135,7 +135,10 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     const std::vector<double> mass = field_masses(body_, cracks.fields());
     std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
     const auto hold = [&](int node, int axis, int driver) {  // where two meet, the first in the list holds
-        if (taken[node][axis]) return false;
+        if (taken[node][axis]) {
+            if (driver < edges_) at_corners_.push_back({node, axis, driver});
+            return false;
+        }
         taken[node][axis] = true;
         held.push_back({node, axis, driver});
         return true;
@@ -221,7 +224,16 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
             for (std::size_t i = 0; i < on_nodes; ++i) {
                 auto further = holds[i];
                 if (further.field != cracks.node_of_field[f]) continue;
-                if (further.driver < edges_ && !lies_at(scene_.edges[further.driver], f, further.field)) continue;
+                const auto keeps = [&](int driver) {
+                    return driver >= edges_ || lies_at(scene_.edges[driver], f, holds[i].field);
+                };
+                if (!keeps(further.driver)) {  // a crack may cut a corner off: what lies at the other side is held there
+                    const auto other = std::ranges::find_if(at_corners_, [&](const Held& h) {
+                        return h.field == holds[i].field && h.axis == holds[i].axis && keeps(h.driver);
+                    });
+                    if (other == at_corners_.end()) continue;
+                    further.driver = other->driver;
+                }
                 further.field = f;
                 holds.push_back(further);
             }

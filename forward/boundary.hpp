@@ -67,6 +67,7 @@ class Boundary {
     const Scene& scene_;
     const Discretisation& body_;
     int edges_;
+    std::vector<Held> at_corners_;  // by edges after the first that holds the node
 };
 
 /// What is measured: which drivers, and along which directions.

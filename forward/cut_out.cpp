@@ -148,8 +148,8 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
     const int nodes = layout.nodes_per_cell();
     std::vector<int> count(cracks.fields(), 0);
     std::vector<Hold> holds;
-    // As the wood beside the node moves, on its side of the crack. Points whose own wood the other grid has there all say the
-    // same; of those for which it is looked for beside all count, so that a mirrored scene is held alike.
+    // As the wood beside the node moves, on its side of the crack. All points around it count, so that a mirrored scene is held
+    // alike; of the same nodes all say the same.
     const auto take = [&](bool once, const auto& find_points) {
         for (int p = 0; p < cracked_.points.count(); ++p) {
             for (const int field : cracked_.points.node[p].first(nodes)) {
@@ -164,7 +164,7 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
         }
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
-    take(true, [&](const Vec2& place, const Vec2&) { return from.points_about(place); });
+    take(solved_there, [&](const Vec2& place, const Vec2&) { return from.points_about(place); });
     take(false, [&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
     for (int p = 0; p < cracked_.points.count(); ++p)
         for (const int field : cracked_.points.node[p].first(nodes))

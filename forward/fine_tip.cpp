@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<double, 4> outermost_half_widths{8.0, 6.0, 4.5, 3.0};
 constexpr std::array<double, 2> half_widths_close_by{6.0, 4.0};
 constexpr std::array<double, 1> half_widths_elsewhere{4.0};
-constexpr double close_by = 0.5;
+constexpr double close_by = 0.5 + 1e-6;  // half a cell too
 
 // Boxes begin and end at multiples of so many of these cells, so that those of neighbouring places are the same more often.
 constexpr std::array<double, 3> pitches{2.0, 2.0, 4.0};
@@ -107,23 +107,25 @@ Box box_around(const Box& way, double half_width, double pitch, const Vec2& cell
             (pitch * cell.array() * high.floor()).matrix().cwiseMin(within.high)};
 }
 
-// Whether no body acts on a box inside, and no crack but this one comes, or is to come, within a cell of it: it would part nodes
-// of the outline.
-bool stands_alone(const Scene& scene, const CrackFields& cracks, int crack, const Box& box, const Vec2& cell,
+// Whether no body acts on a box inside, and no crack but this one parts a node of it, or is to.
+bool stands_alone(const Scene& scene, const Layout& layout, const CrackFields& cracks, int crack, const Box& box,
                   std::span<const TipWay> others) {
     constexpr double hair = 1e-6;
+    constexpr double margin = 2.0;  // of ways [cells]: where a crack ends on another one nodes are parted ahead of it
     for (const Body& rigid : scene.bodies) {
         const auto* circle = std::get_if<Circle>(&rigid.shape);
         if (!box.touches(bounds(rigid.shape))) continue;
         if (!circle || (circle->centre.cwiseMax(box.low).cwiseMin(box.high) - circle->centre).norm() <= circle->radius)
             return false;
     }
-    const Box about{box.low - (1.0 + hair) * cell, box.high + (1.0 + hair) * cell};
-    for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k)
-        if (k != crack && cracks.lines[k].comes_to(about)) return false;
-    return std::ranges::none_of(others, [&](const TipWay& way) {
-        return way.crack != crack && about.touches({way.from.cwiseMin(way.to), way.from.cwiseMax(way.to)});
-    });
+    const auto about = [&](double cells) { return Box{box.low - cells * layout.cell, box.high + cells * layout.cell}; };
+    const Box nodes = about(hair), ways = about(margin + hair);
+    return std::ranges::none_of(
+               cracks.pairs,
+               [&](const FieldPair& pair) { return pair.crack != crack && nodes.contains(layout.node_position(pair.node)); }) &&
+           std::ranges::none_of(others, [&](const TipWay& way) {
+               return way.crack != crack && ways.touches({way.from.cwiseMin(way.to), way.from.cwiseMax(way.to)});
+           });
 }
 
 // Whether a body, where it has come to, presses on the wood in a box. Beside the outline, which is held, it may: within a cell.
@@ -221,7 +223,7 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, const TipWay& 
     Vec2 cell = body_.layout.cell;
     for (std::size_t k = is_close ? 0 : 1; k < outermost_half_widths.size(); ++k) {
         const Box outermost = box_around(way, outermost_half_widths[k], pitches[0], cell, {Vec2::Zero(), size});
-        if (!stands_alone(scene_, cracks, crack, outermost, cell, others)) continue;
+        if (!stands_alone(scene_, body_.layout, cracks, crack, outermost, others)) continue;
         TipBoxes found{{outermost}, std::min(1.0, (far - nearest.way) / (far - near))};
         for (const double half_width : inner)
             found.boxes.push_back(box_around(way, half_width, pitches[found.boxes.size()], cell *= 0.5, found.boxes.back()));
@@ -259,7 +261,7 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    if (opening <= 0.0 || !stands_alone(scene_, cracks, crack, place.boxes[0], body_.layout.cell, {}) ||
+    if (opening <= 0.0 || !stands_alone(scene_, body_.layout, cracks, crack, place.boxes[0], {}) ||
         touches_itself(body_, place.boxes[0], equilibrium, crack) ||
         is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies))
         return {};
