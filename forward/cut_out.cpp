@@ -149,11 +149,20 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
     std::vector<int> count(cracks.fields(), 0);
     std::vector<Hold> holds;
     // As the wood beside the node moves, on its side of the crack. All points around it count, so that a mirrored scene is held
-    // alike; of the same nodes all say the same.
-    const auto take = [&](bool once, const auto& find_points) {
+    // alike; those of a node that is the same on both grids, and that no crack parts on either, all say the same.
+    std::vector<bool> say_the_same(cracks.fields(), solved_there);
+    if (solved_there) {
+        for (const FieldPair& pair : cracks.pairs) say_the_same[pair.left] = say_the_same[pair.right] = false;
+        for (const FieldPair& pair : from.cracks.pairs) {
+            const Vec2 at = (from.body.layout.node_position(pair.node) - shift).cwiseQuotient(layout.cell);
+            const int i = static_cast<int>(std::lround(at.x())), j = static_cast<int>(std::lround(at.y()));
+            if (i >= 0 && j >= 0 && i <= layout.cells_x && j <= layout.cells_y) say_the_same[layout.node_index(i, j)] = false;
+        }
+    }
+    const auto take = [&](const auto& find_points) {
         for (int p = 0; p < cracked_.points.count(); ++p) {
             for (const int field : cracked_.points.node[p].first(nodes)) {
-                if (!unknown[field] || (once && count[field] > 0)) continue;
+                if (!unknown[field] || (say_the_same[field] && count[field] > 0)) continue;
                 const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
                 for (const int other : find_points(cracked_.points.position[p] + shift, x)) {
                     holds.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
@@ -164,8 +173,8 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
         }
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
-    take(solved_there, [&](const Vec2& place, const Vec2&) { return from.points_about(place); });
-    take(false, [&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
+    take([&](const Vec2& place, const Vec2&) { return from.points_about(place); });
+    take([&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
     for (int p = 0; p < cracked_.points.count(); ++p)
         for (const int field : cracked_.points.node[p].first(nodes))
             if (unknown[field]) return false;
