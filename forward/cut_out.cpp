@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace crampfit {
 
@@ -159,12 +160,12 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
             if (i >= 0 && j >= 0 && i <= layout.cells_x && j <= layout.cells_y) say_the_same[layout.node_index(i, j)] = false;
         }
     }
-    const auto take = [&](const auto& find_points) {
+    const auto take = [&](auto&& find_points) {
         for (int p = 0; p < cracked_.points.count(); ++p) {
             for (const int field : cracked_.points.node[p].first(nodes)) {
                 if (!unknown[field] || (say_the_same[field] && count[field] > 0)) continue;
                 const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
-                for (const int other : find_points(cracked_.points.position[p] + shift, x)) {
+                for (const int other : find_points(p, x)) {
                     holds.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
                     std::copy_n(from.body.points.node[other].begin(), nodes, holds.back().from.begin());
                     ++count[field];
@@ -173,8 +174,11 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
         }
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
-    take([&](const Vec2& place, const Vec2&) { return from.points_about(place); });
-    take([&](const Vec2& place, const Vec2& x) { return from.points_beside(place, x); });
+    take([&, last = -1, about = std::vector<int>{}](int p, const Vec2&) mutable -> const std::vector<int>& {
+        if (std::exchange(last, p) != p) about = from.points_about(cracked_.points.position[p] + shift);
+        return about;
+    });
+    take([&](int p, const Vec2& x) { return from.points_beside(cracked_.points.position[p] + shift, x); });
     for (int p = 0; p < cracked_.points.count(); ++p)
         for (const int field : cracked_.points.node[p].first(nodes))
             if (unknown[field]) return false;
