@@ -13,9 +13,6 @@ namespace crampfit {
 
 namespace {
 
-// Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
-constexpr double face_stiffness_factor = 100.0;
-
 // Newton's method ends when no force out of balance exceeds this part of the largest force on a node. A wheel on a sharp corner
 // does not always come below 1e-9.
 constexpr double balance = 1e-8;
@@ -39,7 +36,6 @@ constexpr double worth_keeping_with_friction = 0.25;
 constexpr double slack_of_tangent = 0.005;
 constexpr int quick_iterations = 10;
 constexpr int sorting = 6;       // iterations without an end after which faces that rub are sorted into those that grip and slide
-constexpr int most_changes = 3;  // in iterations after these, between apart and pressed, of faces that stick
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -127,35 +123,6 @@ void Equilibrium::find_pieces(bool crumbs_only) {
     pieces_ = find_loose_pieces(body_, cracks_, boundary_, mass, heaviest);
 }
 
-bool Equilibrium::is_closed(const FieldPair& pair) const {
-    return (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal) < 0.0;
-}
-
-Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
-    if (!is_closed(pair) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
-    const double stiffness = closed_stiffness(pair);
-    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick && !slips(pair)) return stiffness * Mat2::Identity();
-    return stiffness * pair.normal * pair.normal.transpose();
-}
-
-bool Equilibrium::slips(const FieldPair& pair) const {
-    const auto number = static_cast<std::size_t>(&pair - cracks_.pairs.data());
-    return number < slips_.size() && slips_[number];
-}
-
-// Faces that stick and have slid past each other before they met may overlap while they are free and part as soon as they are
-// pulled back: they have met where they are, and press without holding. Whether some are found that do, among pairs that were
-// closed or not one iteration ago.
-bool Equilibrium::let_slip(std::vector<char>& closed, std::vector<int>& changes) {
-    bool some = false;
-    for (std::size_t k = 0; k < closed.size(); ++k) {
-        const FieldPair& pair = cracks_.pairs[k];
-        if (scene_.cracks[pair.crack].faces.kind != CrackFaces::Kind::stick || slips_[k]) continue;
-        if (std::exchange(closed[k], is_closed(pair)) != closed[k] && ++changes[k] > most_changes) slips_[k] = some = true;
-    }
-    return some;
-}
-
 // Ties stand for wood about a tip, or about the end of a held stretch, that no cell resolves. Where that has relaxed or flows,
 // they do: by the secant stiffness, stress times strain over the same if the wood were elastic.
 void Equilibrium::see_what_is_kept() {
@@ -189,10 +156,6 @@ double Equilibrium::tie_of(const FieldPair& pair) const {
 }
 
 Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const { return tie_of(pair) * Mat2::Identity() + face_stiffness(pair); }
-
-double Equilibrium::closed_stiffness(const FieldPair& pair) const {
-    return face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
-}
 
 // Forces out of balance, reactions, and the energies that are not the points'.
 void Equilibrium::find_forces() {
@@ -521,10 +484,11 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
             if (hinges_.size() == most_hinges || !hold_hinge()) return false;
         return std::ranges::none_of(hinges_, [&](int hinge) { return moves_most(hinge); });
     };
-    const std::size_t pairs = cracks_.pairs.size();
-    slips_.assign(pairs, false);
-    std::vector<char> closed(pairs, false);
-    std::vector<int> changes(pairs, 0);
+    const bool sticks =
+        std::ranges::any_of(scene_.cracks, [](const Crack& crack) { return crack.faces.kind == CrackFaces::Kind::stick; });
+    slips_.assign(sticks ? cracks_.pairs.size() : 0, false);
+    std::vector<char> closed(slips_.size(), false);
+    std::vector<int> changes(slips_.size(), 0);
     find_forces();
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {

@@ -107,7 +107,7 @@ class Equilibrium {
         History::State history;                 // of wood that remembers
         std::vector<double> kept;               // [fields] of stiffness by that wood
         double lost_by_ties;                    // with what it did not keep [J]
-        std::vector<char> slips;                // [pairs] faces that stick elsewhere
+        std::vector<char> slips;                // [pairs; empty: no faces stick] those that slide all the same
     };
     Contacts contacts() const;
 
@@ -236,7 +236,7 @@ class Equilibrium {
     std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis
     std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
-    std::vector<char> slips_;                        // [pairs, or fewer] faces that stick elsewhere
+    std::vector<char> slips_;                        // [pairs, or fewer] of faces that stick, those that slide all the same
     std::vector<Mat2> pair_stiffness_;               // [pairs] as last factored [N/m]
     std::multimap<int, GridFactor::Element> extra_;  // by cell: what is not the points'
     std::vector<double> prescribed_step_;            // [2 x fields] what prescribed components still have to go [m]

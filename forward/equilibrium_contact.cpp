@@ -1,4 +1,4 @@
-// Of equilibrium, what bodies that follow a force and friction add to it.
+// Of equilibrium, what contact adds to it: crack faces that press, bodies that follow a force, friction.
 #include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
 #include "forward/local_yield.hpp"
@@ -21,7 +21,46 @@ constexpr int bisections = 50;
 // Motions of free bodies that meet less stiffness than this part of the largest meet none: no force goes with them.
 constexpr double no_stiffness = 1e-9;
 
+// Stiffness of closed crack faces over that of the pair's wood, E' B: they overlap by as much less than the wood yields.
+constexpr double face_stiffness_factor = 100.0;
+
+// So often may faces that stick go between apart and pressed, from iteration to iteration, before they slide.
+constexpr int most_changes = 3;
+
 }  // namespace
+
+bool Equilibrium::is_closed(const FieldPair& pair) const {
+    return (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal) < 0.0;
+}
+
+Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
+    if (!is_closed(pair) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
+    const double stiffness = closed_stiffness(pair);
+    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick && !slips(pair)) return stiffness * Mat2::Identity();
+    return stiffness * pair.normal * pair.normal.transpose();
+}
+
+bool Equilibrium::slips(const FieldPair& pair) const {
+    const auto number = static_cast<std::size_t>(&pair - cracks_.pairs.data());
+    return number < slips_.size() && slips_[number];
+}
+
+// Faces that stick and have slid past each other before they met may overlap while they are free and part as soon as they are
+// pulled back: they have met where they are, and press without holding. Whether some are found that do, among pairs that were
+// closed or not one iteration ago.
+bool Equilibrium::let_slip(std::vector<char>& closed, std::vector<int>& changes) {
+    bool some = false;
+    for (std::size_t k = 0; k < closed.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        if (scene_.cracks[pair.crack].faces.kind != CrackFaces::Kind::stick || slips_[k]) continue;
+        if (std::exchange(closed[k], is_closed(pair)) != closed[k] && ++changes[k] > most_changes) slips_[k] = some = true;
+    }
+    return some;
+}
+
+double Equilibrium::closed_stiffness(const FieldPair& pair) const {
+    return face_stiffness_factor * pair.plane_modulus * body_.layout.thickness;
+}
 
 void Equilibrium::find_free_bodies() {
     moved_.assign(boundary_.drivers(), Vec2::Zero());

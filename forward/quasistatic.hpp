@@ -122,7 +122,7 @@ class Quasistatic {
         std::map<int, Slopes> slopes;                   // their derivatives
         std::map<int, std::vector<Vec2>> probes;     // what they read, whatever the shift; in a linear scene of times 0 and last
         std::vector<std::optional<TipBoxes>> boxes;  // [growing] about the tips' next advance; none: nothing is missed
-        std::map<int, std::size_t> failed;           // times without an equilibrium; from how many that it was looked for
+        std::map<int, std::size_t> failed;           // times without an equilibrium; how many states were known
         std::set<int> guessed;                       // times at which the station's state is no more than roughly known
     };
 

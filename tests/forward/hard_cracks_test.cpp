@@ -304,7 +304,30 @@ TEST(HardTwoCracks, NearlyMeeting) {
     }
 }
 
-// A crack from the left side through rings of two woods.
+// It turns by 47 degrees in a cell, alongside latewood 30 times as stiff, where the grid's energy rises as it goes on: no reason
+// to take the equilibrium for an absurd one.
+TEST(HardPath, ASharpTurnAtFiniteRotationDoesNotEndTheRun) {
+    Scene scene = at_equilibrium(block({8e-3, 8e-3}, 0.2e-3));
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{{-2.78650845e-3, 4.60407768e-3}, 2.27124001e-3, 0.322018, 0.0};
+    scene.materials["EW"] = {317.31e6, 0.33, 300.0, 127.623635};
+    scene.materials["LW"] = {9519.31e6, 0.33, 300.0, 252.032943};
+    scene.edges = {moving("grip", Side::top, {0.0, 1e-5}), moving("hold", Side::bottom, Vec2::Zero())};
+    scene.edges[0].velocity[0].reset();
+    Crack crack;
+    crack.points = {{0.0, 4.10039966e-3}, {1.77701962e-3, 4.10039966e-3}};
+    crack.grows = Growth::end;
+    crack.advance = 0.2e-3;
+    crack.direction = GrowthDirection::energy_release_rate;
+    scene.cracks = {crack};
+    scene.measure = {"grip", "grip"};
+    scene.stop.displacement = 0.5e-3;
+    scene.solver.strain = StrainMeasure::finite_rotation;
+    const Record record = simulate(scene);
+    hard_case("crack that turns sharply, finite rotation", "goes through the specimen", record.status != RunStatus::split, 0.0);
+}
+
+// A crack from the left side through rings of two woods, and others within.
 struct RingScene {
     Vec2 size{8e-3, 6e-3};                         // of the specimen [m]
     Vec2 pith{1.03e-3, -1.91e-3};                  // [m]
@@ -353,7 +376,7 @@ void check_images(const std::string& name, const RingScene& rings) {
                                              {"mirrored in y", Mat2{{1, 0}, {0, -1}}},
                                              {"turned by 90 degrees", Mat2{{0, -1}, {1, 0}}}};
     const Record record = simulate(rings.seen_in(Mat2::Identity()));
-    ASSERT_GT(record.driving.size(), 10) << name;
+    ASSERT_GT(record.driving.size(), rings.others.empty() ? 20 : 10) << name;
     for (const auto& [what, image] : images) {
         const Scene scene = rings.seen_in(image);
         const Record seen = simulate(scene);
