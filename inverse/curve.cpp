@@ -7,6 +7,11 @@
 #include <numeric>
 
 namespace crampfit {
+namespace {
+
+constexpr double narrow = 1e-9;  // of the curve: there a difference of areas is all rounding, and a rise is a step
+
+}  // namespace
 
 Curve::Curve(std::span<const double> x, std::span<const double> y) {
     assert(x.size() == y.size());
@@ -70,7 +75,6 @@ double Curve::area(double x) const {
 }
 
 double Curve::mean(double from, double to) const {
-    constexpr double narrow = 1e-9;  // of the curve: there a difference of areas is all rounding
     return to - from > narrow * (x_.back() - x_.front()) ? (area(to) - area(from)) / (to - from) : 0.5 * (at(from) + at(to));
 }
 
@@ -79,7 +83,6 @@ int Curve::count(double from, double to) const {
 }
 
 double Curve::error_of_mean(double from, double to) const {
-    constexpr double narrow = 1e-9;  // as in `mean`
     if (!(to - from > narrow * (x_.back() - x_.front()))) {
         const double at = std::clamp(0.5 * (from + to), x_.front(), x_.back());
         const auto above = std::max<std::ptrdiff_t>(1, std::lower_bound(x_.begin(), x_.end(), at) - x_.begin());
@@ -120,10 +123,21 @@ double Curve::widest_step(double from, double to) const {
 }
 
 Curve Curve::smoothed(double window) const {
+    const double least = narrow * (x_.back() - x_.front());
     Curve result = *this;
-    for (std::size_t i = 0; i < x_.size(); ++i) {
-        const double half = std::min({0.5 * window, x_[i] - x_.front(), x_.back() - x_[i]});
-        result.y_[i] = mean(x_[i] - half, x_[i] + half);
+    for (std::size_t i = 0; i + 1 < x_.size(); ++i) {
+        for (const double corner : {x_[i] - 0.5 * window, x_[i] + 0.5 * window}) {
+            if (x_[i + 1] - x_[i] <= least && corner > x_.front() && corner < x_.back()) {
+                result.x_.push_back(corner);
+            }
+        }
+    }
+    std::sort(result.x_.begin(), result.x_.end());
+    result.x_.erase(std::unique(result.x_.begin(), result.x_.end()), result.x_.end());
+    result.y_.clear();
+    for (const double x : result.x_) {
+        const double half = std::min({0.5 * window, x - x_.front(), x_.back() - x});
+        result.y_.push_back(half > least ? mean(x - half, x + half) : at(x));
     }
     result.integrate();
     return result;

@@ -27,8 +27,8 @@ class Curve {
     /// The widest step from node to node that lies at least partly within an interval; 0 where there is none.
     double widest_step(double from, double to) const;
 
-    /// The same nodes, each with the average over a window about it. Near an end the window shrinks from both sides
-    /// alike, so that a straight line stays what it is.
+    /// The same nodes, and those where a window comes up to a step and leaves it, each with the average over a window about it.
+    /// Near an end the window shrinks from both sides alike, so that a straight line stays what it is.
     Curve smoothed(double window) const;
 
     /// Where the curve comes up to `level`: so that it is above for as long before as it is below after, which for a rising curve

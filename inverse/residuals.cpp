@@ -107,12 +107,16 @@ class GrowthByRows {
             if (jumped < 0.5 && grown[i] > 0) {
                 steady.push_back(grown[i]);
             }
+            ends_with_jump_ = jumped >= 0.5;
         }
         steady_step_ = median(std::move(steady));
     }
 
     // Median growth between two rows of a crack that grows steadily [m].
     double steady_step() const { return steady_step_; }
+
+    // Whether the last row was reached by a jump.
+    bool ends_with_jump() const { return ends_with_jump_; }
 
     // What jumps within half a `window` of a place leave open there [m] or [s].
     double error_near(double at, double window) const {
@@ -129,7 +133,17 @@ class GrowthByRows {
     const Curve& rows_;
     std::vector<double> jump_error_;  // of an arrival between two rows [m] or [s]
     double steady_step_ = 0;
+    bool ends_with_jump_ = false;
 };
+
+// The curve that keeps its last value up to a place beyond it.
+Curve continued(std::vector<double> x, std::vector<double> y, double to) {
+    if (x.back() < to) {
+        x.push_back(to);
+        y.push_back(y.back());
+    }
+    return Curve(x, y);
+}
 
 // What an error of the abscissa, one sigma, does to a mean of the curve at a place: its range within two sigmas over their width,
 // times sigma: for a straight line slope times sigma, and near a jump it knows of the jump.
@@ -301,8 +315,10 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
     // not show.
     const bool sparse = smoothing_window * static_cast<double>(rows.x().size()) < rows_in_a_window;
     arrival_window_ = sparse ? 0.0 : smoothing_window * (to - from);
-    arrival_end_ = to;
-    const Curve crack = rows.smoothed(arrival_window_);
+    // A crack that ends with a jump is no shorter from there on: all of the window sees the jump, in model and data alike.
+    const GrowthByRows growth_by_rows(rows, noise);
+    arrival_end_ = growth_by_rows.ends_with_jump() ? to + arrival_window_ : to;
+    const Curve crack = continued(rows.x(), rows.y(), arrival_end_).smoothed(arrival_window_);
     const double shortest = rows.mean(from, from + arrival_window_);
     // A test may end with a jump, which its last row alone has seen.
     const double longest = std::max(rows.mean(to - arrival_window_, to), rows.y().back() - 3 * noise);
@@ -312,7 +328,6 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         return;
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
-    const GrowthByRows growth_by_rows(rows, noise);
     const double close =
         std::max(std::clamp(growth / 24, near_stations, far_stations), line_averages * growth_by_rows.steady_step());
     const double spacing = std::max(std::min(close, growth / 2), growth / most_arrivals);
@@ -425,16 +440,12 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
     if (record.status == RunStatus::split) {
         force.continue_with(slack_force);
     }
-    // A run may end with a jump, at the crack length where it was told to stop: the crack is no shorter from there on.
     const double end = *std::max_element(abscissa.begin(), abscissa.end());
     const std::size_t rows = abscissa.size();
     const bool ends_with_jump =
         rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-8 * end && lengths[rows - 1] > lengths[rows - 2];
-    if (ends_with_jump && end < arrival_end_) {
-        abscissa.push_back(arrival_end_);
-        lengths.push_back(lengths.back());
-    }
-    const Curve length(abscissa, lengths), crack = length.smoothed(arrival_window_);
+    const Curve length = continued(abscissa, lengths, ends_with_jump ? arrival_end_ : end);
+    const Curve crack = length.smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());
     std::vector<double> values;
     auto tile = length_tiles_.begin(), force_tile = force_tiles_.begin();

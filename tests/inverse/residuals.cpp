@@ -341,6 +341,45 @@ TEST(UnitResiduals, AStationThatIsNeverReachedIsFiniteAndContinuous) {
     EXPECT_TRUE(comparison.modelled(stuck).allFinite());
 }
 
+// A test that ends with a jump, in its last two rows at one displacement or between them, says when that was; a model whose jump
+// is earlier or later by a part of a window is off by that, however little it is.
+TEST(UnitResiduals, AJumpAtTheEndIsTimedContinuously) {
+    const auto ends_with_jump = [](double at, bool goes_on) {
+        Record record = straight(1e5, 1, 1e-3, 201);
+        std::erase_if(record.series, [&](const Instant& instant) { return instant.displacement >= at; });
+        for (const double crack_length : {2e-3 + at, 6e-3}) {
+            Instant& instant = record.series.emplace_back();
+            instant.displacement = at;
+            instant.time = 2 * at;
+            instant.force = 1e5 * at;
+            instant.crack_length = crack_length;
+        }
+        if (goes_on) {
+            record.series.push_back(record.series.back());
+            record.series.back().displacement = 1.1e-3;
+        }
+        return record;
+    };
+    Experiment experiment = straight_experiment();
+    const double at = 0.97312e-3;
+    for (const bool data_goes_on : {false, true}) {
+        experiment.data = measure(ends_with_jump(at, data_goes_on), 0, 0, 1);
+        const Comparison comparison(experiment);
+        for (const double by : {-1e-6, -1e-8, -1e-12, -2e-19, 0.0, 2e-19, 1e-12, 1e-8, 1e-6}) {
+            const Eigen::VectorXd modelled = comparison.modelled(ends_with_jump(at + by, false));
+            double most = 0;
+            for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+                const FitResidual& station = comparison.stations()[i];
+                if (station.kind == "arrival" && station.at > 3.3e-3) {
+                    const double off = modelled[static_cast<Eigen::Index>(i)] - station.measured;
+                    most = std::max(most, std::abs(off - by));
+                }
+            }
+            EXPECT_LT(most, 0.2 * std::abs(by) + 1e-17) << by << (data_goes_on ? ", and data go on" : "");
+        }
+    }
+}
+
 TEST(UnitResiduals, NoiseThatIsNotGivenIsEstimatedAndSaidSo) {
     Experiment experiment = straight_experiment();
     experiment.noise = {};
