@@ -12,6 +12,7 @@
 #include <deque>
 #include <list>
 #include <mutex>
+#include <set>
 
 namespace crampfit {
 namespace {
@@ -142,12 +143,23 @@ class KeptWalks::Store {
         if (others_.empty() ? !only_toughness() : !has_slopes()) {
             return false;
         }
-        return std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) {
-            return std::all_of(scene->cracks.begin(), scene->cracks.end(), [&](const Crack& crack) {
-                return crack.grows == Growth::none || crack.direction == GrowthDirection::straight ||
-                       (others_.empty() && !turns_with_toughness(*scene));
+        return turning().empty();
+    }
+
+    std::vector<Eigen::Index> turning() const {
+        std::set<Eigen::Index> found;
+        for (const Scene* scene : scenes_) {
+            const bool turns = std::any_of(scene->cracks.begin(), scene->cracks.end(), [](const Crack& crack) {
+                return crack.grows != Growth::none && crack.direction != GrowthDirection::straight;
             });
-        });
+            const Setting* unit = unit_of(*scene);
+            for (const Setting& setting : settings_of_walk(*scene)) {
+                if (turns && !(unit && unit->parameter == setting.parameter)) {
+                    found.insert(static_cast<Eigen::Index>(setting.parameter));
+                }
+            }
+        }
+        return {found.begin(), found.end()};
     }
 
   private:
@@ -266,7 +278,7 @@ class KeptWalks::Store {
             return *known;
         }
         walks_.push_back({name, nullptr});
-        if (walks_.size() > std::max(most_walks, 2 * scenes_.size())) {
+        if (walks_.size() > std::max(most_walks, (others_.size() + toughness_.size() + 2) * scenes_.size())) {
             std::erase_if(put_off_, [&](const Work& work) { return work.walk == walks_.front().name; });
             walks_.pop_front();
         }
@@ -333,6 +345,7 @@ void KeptWalks::catch_up(const std::vector<double>& values) const { store_->catc
 
 bool KeptWalks::only_toughness() const { return store_->only_toughness(); }
 bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness(); }
+std::vector<Eigen::Index> KeptWalks::turning() const { return store_->turning(); }
 std::vector<bool> KeptWalks::exact_near() const { return store_->exact_near(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
 bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }

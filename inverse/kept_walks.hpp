@@ -3,7 +3,10 @@
 #include "datasets/experiment.hpp"
 #include "inverse/forward.hpp"
 
+#include <Eigen/Core>
+
 #include <memory>
+#include <vector>
 
 namespace crampfit {
 
@@ -46,6 +49,9 @@ class KeptWalks {
 
     /// Whether other toughnesses send a crack another way.
     bool turn_with_toughness() const;
+
+    /// The parameters that turn a crack's way, but for one that gives all stress its unit.
+    std::vector<Eigen::Index> turning() const;
 
     /// In which parameters runs near a point are exact [parameters].
     std::vector<bool> exact_near() const;

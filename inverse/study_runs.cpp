@@ -1,6 +1,7 @@
 #include "inverse/study_runs.hpp"
 
 #include "datasets/run_journal.hpp"
+#include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
 
 #include <algorithm>
@@ -9,6 +10,10 @@
 
 namespace crampfit {
 namespace {
+
+constexpr double all_ways = 1.0;       // of the box, to either side
+constexpr double ways_beside = 0.01;   // farther than from one jump of the misfit, as the grid sees ways, to the next
+constexpr double nothing_left = 1e-6;  // of what noise leaves
 
 constexpr int most_weighings = 4;     // by another resolution of the model
 constexpr double least_change = 0.1;  // of a sigma, that they are made for
@@ -46,7 +51,11 @@ StudyRuns::StudyRuns(const Study& study, const FitOptions& options, RunStore& st
       by_walks_(has_walks_ && study.optimizer.method == "auto"),
       in_order_((by_walks_ || only_toughness_) && walks_.depend_on_order()),
       model_(study, forward(), options.forward ? 0.0 : solver_resolution, options.stop_requested),
-      nearby_{by_walk_of(&KeptWalks::near), by_walk_of(&KeptWalks::rough), walks_.exact_near(), walks_.turn_with_toughness(),
+      nearby_{by_walk_of(&KeptWalks::near),
+              by_walk_of(&KeptWalks::rough),
+              walks_.exact_near(),
+              walks_.turn_with_toughness(),
+              in_order_ ? std::vector<Eigen::Index>{} : walks_.turning(),
               [this](const auto&... asked) { return recall(asked...); }},
       // Steps on walks go on from the one before, where the walks are.
       shared_([this](const Eigen::VectorXd& values, int share) { return model_.at(values, in_order_ ? threads_ : share); },
@@ -123,6 +132,19 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
     SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
     found.converged = weigh_and_descend(found.converged, enough > 0);
+    if (!nearby_.turning.empty() && objective_.best()) {
+        for (const double reach : {all_ways, ways_beside}) {
+            const bool was_searched = reach == all_ways && starts == 1;
+            if (!was_searched && is_left_over() && !objective_.exhausted()) {
+                stage("other ways");
+                if (look_for_ways(objective_, nearby_, reach, options_.seed)) {
+                    found.converged = descend_again();
+                }
+            }
+        }
+        stage("closing in");
+        found.converged = close_in(objective_, nearby_, options_.seed) && weigh_and_descend(found.converged, false);
+    }
     return found;
 }
 
@@ -159,6 +181,19 @@ bool StudyRuns::weigh_anew(double least) {
         return evaluation;
     });
     return true;
+}
+
+// Whether more than noise is left, or hardly any: then the data may hold what another way would explain.
+bool StudyRuns::is_left_over() const {
+    constexpr double hardly_any = 0.25;  // of what noise leaves
+    const Evaluation& best = *objective_.best()->evaluation;
+    const auto checks = check_fit(model_.residuals(best), static_cast<int>(model_.box().size()));
+    double left = 0, points = 0;
+    for (const FitCheck& check : checks) {
+        left += check.chi_square;
+        points += check.points;
+    }
+    return left < hardly_any * points ? left > nothing_left * points : !lack_of_fit(checks).empty();
 }
 
 // How well the model knows what it says shows where it fits: on to the lowest point as that weighs it.

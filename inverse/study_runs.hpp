@@ -55,6 +55,7 @@ class StudyRuns {
     Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
     bool weigh_anew(double least_change);
+    bool is_left_over() const;
     bool weigh_and_descend(bool converged, bool ended_early);
     Evaluation run(const Eigen::VectorXd& x, int share);
     Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace crampfit {
 namespace {
@@ -37,6 +38,16 @@ constexpr int descents_of_starts = 3;
 
 constexpr int most_failed_starts = 20;
 
+// Looking for other ways.
+constexpr int ways_a_parameter = 16;
+constexpr std::size_t most_ways_tried = 3;
+
+// Closing in on the lowest point where ways turn, in parts of the box: far less than a way goes on without a jump; far more than
+// a run's rounding.
+constexpr double aside = 0.1;  // of the window
+constexpr double most_aside = 3e-4, least_aside = 1e-6;
+constexpr double rounding = 1e-12;  // of the misfit for each residual
+
 // Levenberg's and Marquardt's steps (Marquardt 1963) with slopes by small differences, within the unit cube.
 void polish(Objective& cheap, Eigen::VectorXd y) {
     const auto size = y.size();
@@ -45,13 +56,13 @@ void polish(Objective& cheap, Eigen::VectorXd y) {
     for (int step = 0; step < most_polishing_steps && here && here->usable(); ++step) {
         Eigen::MatrixXd slopes(here->residuals.size(), size);
         for (Eigen::Index j = 0; j < size; ++j) {
-            Eigen::VectorXd aside = y;
-            aside[j] += y[j] < 0.5 ? polishing_difference : -polishing_difference;
-            const auto there = cheap.at(aside);
+            Eigen::VectorXd beside = y;
+            beside[j] += y[j] < 0.5 ? polishing_difference : -polishing_difference;
+            const auto there = cheap.at(beside);
             if (!there || !there->usable()) {
                 return;
             }
-            slopes.col(j) = (there->residuals - here->residuals) / (aside[j] - y[j]);
+            slopes.col(j) = (there->residuals - here->residuals) / (beside[j] - y[j]);
         }
         const Eigen::MatrixXd normal = slopes.transpose() * slopes;
         const Eigen::VectorXd gradient = slopes.transpose() * here->residuals;
@@ -112,6 +123,11 @@ Lowest lowest_near(const Eigen::VectorXd& point, const Nearby& nearby, bool roug
     return nearby.recall ? nearby.recall(point, window, rough, search) : search();
 }
 
+bool is_worth_a_run(const Evaluation& here, double gain) {
+    const bool noisy = here.misfit - gain > free_of_noise * static_cast<double>(here.residuals.size());
+    return gain > std::max(least_gain * here.misfit, noisy ? least_rise : 0.0);
+}
+
 struct Descent {
     bool converged;          // it ended by its own criterion
     double unconfirmed = 0;  // gain of the misfit that its last steps promised and no run confirmed
@@ -131,25 +147,21 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
         }
         const Run here = *objective.best();
         const double misfit = here.evaluation->misfit;
-        const auto is_worth_a_run = [&](double gain) {
-            const bool noisy = misfit - gain > free_of_noise * static_cast<double>(here.evaluation->residuals.size());
-            return gain > std::max(least_gain * misfit, noisy ? least_rise : 0.0);
-        };
         Lowest trial = lowest_near(here.x, nearby, true, Window::around(here.x, radius * reach), objective, seed);
-        if (!is_worth_a_run(misfit - trial.misfit)) {
+        if (!is_worth_a_run(*here.evaluation, misfit - trial.misfit)) {
             trial = lowest_near(here.x, nearby, false,
                                 Window::around(here.x, Eigen::VectorXd::Constant(here.x.size(), std::min(radius, last_radius))),
                                 objective, seed);
         }
         const double expected = misfit - trial.misfit;
-        if (!is_worth_a_run(expected)) {
+        if (!is_worth_a_run(*here.evaluation, expected)) {
             return {!objective.stopped(), unconfirmed};
         }
         const auto there = objective.at(trial.x);
         const double gain = misfit - objective.best()->evaluation->misfit;
         const Eigen::VectorXd away = (trial.x - here.x).cwiseAbs();
         const double step = away.cwiseQuotient(reach).maxCoeff();
-        if (is_worth_a_run(gain)) {
+        if (is_worth_a_run(*here.evaluation, gain)) {
             in_vain = 0;
         } else if (away.maxCoeff() <= last_radius && there && there->usable()) {
             ++in_vain;
@@ -158,6 +170,67 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
         radius = gain < 0.25 * expected ? 0.25 * std::min(radius, step) : std::clamp(2.0 * step, last_radius, first_radius);
     }
     return {objective.best() != nullptr && (radius < least_radius || in_vain == most_unconfirmed), unconfirmed};
+}
+
+// What is known beside a point of how parameters turn the crack.
+struct Aside {
+    Eigen::Index parameter;
+    double by;
+    Objective::Evaluate near;
+};
+
+// Runs a little aside in each parameter that turns the crack. To one side the crack may jump to another way: where the turn does
+// more than all else that the parameter does, the other side is tried too, and the one taken where it does less.
+std::vector<Aside> look_aside(Objective& objective, const Nearby& nearby, const Run& here, double distance) {
+    const Objective::Evaluate near = nearby.near(here.x);
+    std::vector<Aside> found;
+    for (Eigen::Index j = 0; j < here.x.size(); ++j) {
+        double least = INFINITY;
+        const double inwards = here.x[j] < 0.5 ? distance : -distance;
+        for (const double by : {inwards, -inwards}) {
+            Eigen::VectorXd point = here.x;
+            point[j] += by;
+            if (nearby.exact[static_cast<std::size_t>(j)] || least <= 1.0 || point[j] < 0.0 || point[j] > 1.0) {
+                continue;
+            }
+            const auto run = objective.at(point);
+            const Evaluation straight = near(point, 1);
+            if (!run || !run->usable() || !straight.usable()) {
+                continue;
+            }
+            const double turn = (run->residuals - straight.residuals).norm();
+            const double rest = (straight.residuals - here.evaluation->residuals).norm();
+            if (std::isinf(least) || turn < least * rest) {
+                if (!std::isinf(least)) {
+                    found.pop_back();
+                }
+                found.push_back({j, by, nearby.near(point)});
+                least = rest > 0 ? turn / rest : 0.0;
+            }
+        }
+    }
+    return found;
+}
+
+// The runs nearby with what the turn of the crack does, to first order.
+Objective::Evaluate mended(const Objective::Evaluate& near, const Eigen::VectorXd& point, const std::vector<Aside>& asides) {
+    return [near, point, asides](const Eigen::VectorXd& x, int threads) {
+        Evaluation result = near(x, threads);
+        if (!result.usable()) {
+            return result;
+        }
+        Eigen::VectorXd turn = Eigen::VectorXd::Zero(result.residuals.size());
+        for (const Aside& known : asides) {
+            const double steps = (x[known.parameter] - point[known.parameter]) / known.by;
+            const Evaluation other = steps != 0.0 ? known.near(x, threads) : Evaluation{};
+            if (other.usable()) {
+                turn += steps * (other.residuals - result.residuals);
+            }
+        }
+        result.residuals += turn;
+        result.misfit = result.residuals.squaredNorm();
+        return result;
+    };
 }
 
 // Whether the noise explains the misfit: residuals of two sigma at most.
@@ -194,11 +267,80 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby
 
 }  // namespace
 
+bool close_in(Objective& objective, const Nearby& nearby, unsigned seed) {
+    if (!objective.best() || objective.exhausted()) {
+        return false;
+    }
+    double radius = last_radius;
+    for (int in_vain = 0; in_vain < most_unconfirmed && !objective.exhausted();) {
+        const Run here = *objective.best();
+        const double misfit = here.evaluation->misfit;
+        if (misfit < rounding * static_cast<double>(here.evaluation->residuals.size())) {
+            break;
+        }
+        const Objective::Evaluate model =
+            mended(nearby.near(here.x), here.x,
+                   look_aside(objective, nearby, here, std::clamp(aside * radius, least_aside, most_aside)));
+        const Window window = Window::around(here.x, Eigen::VectorXd::Constant(here.x.size(), radius));
+        const Lowest trial = lowest(model, window, here.x, true, objective.threads(), objective.stop(), seed);
+        if (!is_worth_a_run(*here.evaluation, misfit - trial.misfit)) {
+            break;
+        }
+        objective.at(trial.x);
+        const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
+        const bool is_lower = is_worth_a_run(*here.evaluation, misfit - objective.best()->evaluation->misfit);
+        radius = is_lower ? std::min(4.0 * step, last_radius) : 0.25 * step;
+        in_vain = is_lower ? 0 : in_vain + 1;
+    }
+    return !objective.stopped();
+}
+
+bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed) {
+    const Run here = *objective.best();
+    const auto dimensions = static_cast<Eigen::Index>(nearby.turning.size());
+    const int ways = ways_a_parameter * static_cast<int>(dimensions);
+    Eigen::VectorXd half = Eigen::VectorXd::Constant(here.x.size(), first_radius);
+    std::vector<Eigen::VectorXd> places(static_cast<std::size_t>(ways), here.x);
+    const std::vector<Eigen::VectorXd> even = sobol_points(ways, dimensions, seed);
+    for (Eigen::Index d = 0; d < dimensions; ++d) {
+        const Eigen::Index j = nearby.turning[static_cast<std::size_t>(d)];
+        const double low = std::max(0.0, here.x[j] - reach), width = std::min(1.0, here.x[j] + reach) - low;
+        for (int i = 0; i < ways; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            places[k][j] = low + width * (dimensions > 1 ? even[k][d] : (i + 0.5) / ways);
+        }
+        half[j] = 2.0 * width / std::pow(ways, 1.0 / static_cast<double>(dimensions));
+    }
+    std::vector<Lowest> found;
+    constexpr std::size_t together = 4;  // whose walks are kept
+    for (std::size_t k = 0; k < places.size() && !objective.exhausted(); k += together) {
+        const std::span<const Eigen::VectorXd> some(&places[k], std::min(together, places.size() - k));
+        const auto runs = objective.at(some);
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            if (runs[i] && runs[i]->usable()) {
+                found.push_back(lowest_near(some[i], nearby, true, Window::around(some[i], half), objective, seed));
+            }
+        }
+    }
+    std::stable_sort(found.begin(), found.end(), [](const Lowest& a, const Lowest& b) { return a.misfit < b.misfit; });
+    found.resize(std::min<std::size_t>(found.size(), most_ways_tried));
+    std::vector<Eigen::VectorXd> trials;
+    for (const Lowest& trial : found) {
+        trials.push_back(trial.x);
+    }
+    objective.at(trials);
+    return objective.best()->evaluation->misfit < here.evaluation->misfit;
+}
+
 bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed) {
     const Eigen::VectorXd start = objective.best()->x;
     const bool converged = descend_from(objective, nearby, start, 0.0, seed).converged;
-    // From way to way the misfit is rough: polynomials of the runs themselves see past that.
-    return nearby.ways_differ ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged : converged;
+    if (!nearby.ways_differ) {
+        return converged;
+    }
+    // From way to way the misfit is rough. Polynomials of the runs themselves see past that.
+    return nearby.turning.empty() ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged
+                                  : close_in(objective, nearby, seed);
 }
 
 SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,

@@ -23,7 +23,10 @@ struct Nearby {
     Near near;
     Near rough;               // the same from what is known already, at no equilibria; for a search that `near` or a run confirms
     std::vector<bool> exact;  // [parameters] in which they are; in the others to first order
-    bool ways_differ;         // from point to point, which they do not see
+    bool ways_differ;         // with every parameter from point to point, which they do not see
+    /// Parameters that turn the ways where runs nearby hang on no others: a run is needed for each way, and that says all about
+    /// what else there is.
+    std::vector<Eigen::Index> turning = {};
     /// The lowest point in a window about `point`: what the search finds, or has found before. May be empty.
     std::function<Lowest(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search)>
         recall = {};
@@ -39,6 +42,14 @@ struct Nearby {
 SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
                               const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage);
+
+/// Goes on from the best run to the lowest point about it where ways turn: runs nearby know nothing of that. Others a little
+/// aside in each parameter that turns the way do, to first order. Whether it ended by its own criterion.
+bool close_in(Objective& objective, const Nearby& nearby, unsigned seed);
+
+/// Looks at ways on both sides of the best run's, as far as `reach` in each parameter that turns them [of the box]: a run goes
+/// each way, and the lowest point of what lies nearby is tried. Whether one was lower.
+bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed);
 
 /// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
 /// criterion.

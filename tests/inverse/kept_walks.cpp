@@ -1,5 +1,6 @@
 #include "inverse/kept_walks.hpp"
 #include "forward/simulate.hpp"
+#include "inverse/fit.hpp"
 #include "inverse/stress_unit.hpp"
 
 #include <gtest/gtest.h>
@@ -183,6 +184,51 @@ TEST(UnitStressUnit, IsRefusedWhereOtherStressHasASay) {
     grained.materials["EW"].orthotropic = OrthotropicElasticity{.E_R = 8e8, .E_T = 4e8, .G_RT = 4e7};
     EXPECT_EQ(stress_keys(grained),
               (std::vector<std::string>{"materials.EW.E_R", "materials.EW.E_T", "materials.EW.G_RT", "materials.LW.E"}));
+}
+
+// Moduli turn the crack, and a point of the grid that it passes on the other side is a jump of the misfit: the true values lie
+// behind several of those.
+TEST(SystemTurningFit, FindsModuliAndToughnessesOfDataWithoutNoise) {
+    const double truth[] = {400e6, 100, 4000e6, 150};
+    for (const GrowthDirection direction : {GrowthDirection::normal_to_opening, GrowthDirection::hoop_stress}) {
+        Scene scene = across_inclined_rings(direction);
+        scene.materials["LW"].toughness = truth[3];
+        const Record record = simulate(scene);
+        Study study = toughness_study(scene);
+        Experiment& test = study.experiments.front();
+        test.name = "drawn apart";
+        double peak = 0;
+        for (const Instant& instant : record.series) {
+            test.data.time.push_back(instant.time);
+            test.data.displacement.push_back(instant.displacement);
+            test.data.force.push_back(instant.force);
+            test.data.crack_length.push_back(instant.crack_length);
+            peak = std::max(peak, instant.force);
+        }
+        test.noise.force = 0.01 * peak;
+        test.noise.crack_length = 0.1e-3;
+        study.parameters.clear();
+        const double off[] = {1.3, 0.75, 0.7, 1.3};
+        const char* keys[] = {"EW.E", "EW.toughness", "LW.E", "LW.toughness"};
+        for (int k = 0; k < 4; ++k) {
+            Parameter& parameter = study.parameters.emplace_back();
+            parameter.name = keys[k];
+            parameter.keys = {std::string("materials.") + keys[k]};
+            parameter.initial = off[k] * truth[k];
+            parameter.lower = truth[k] / 5;
+            parameter.upper = truth[k] * 5;
+            parameter.scale = Scale::logarithmic;
+        }
+        const Fit fit = fit_study(study, {});
+        std::printf("%d runs in %.1f s, misfit %.1e", static_cast<int>(fit.runs.size()), fit.seconds, fit.misfit);
+        for (int k = 0; k < 4; ++k) {
+            const double error = fit.parameters[k].value / truth[k] - 1;
+            std::printf(", %s %+.1e", keys[k], error);
+            EXPECT_LT(std::abs(error), 1e-6) << keys[k];
+        }
+        std::printf("\n");
+        EXPECT_EQ(fit.status, FitStatus::converged);
+    }
 }
 
 }  // namespace

@@ -192,13 +192,14 @@ TEST(SystemResume, ATornLastEntryCostsOneRun) {
     const Fit whole = fit_study(study, options);
     const std::string bytes = folder.read("fit.runs");
     options.keeping.resume = true;
+    int runs = 0;
+    options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
+        ++runs;
+        return FakeWedge{}(scene);
+    };
     for (const std::size_t lost : {std::size_t{1}, std::size_t{17}, bytes.size() - 1, bytes.size() - 30, bytes.size()}) {
         folder.write("fit.runs", bytes.substr(0, bytes.size() - lost));
-        int runs = 0;
-        options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
-            ++runs;
-            return FakeWedge{}(scene);
-        };
+        runs = 0;
         expect_same_bits(fit_study(study, options), whole);
         EXPECT_EQ(folder.read("fit.runs").size(), bytes.size());
         EXPECT_EQ(runs, lost < 100 ? 1 : static_cast<int>(whole.runs.size()));
