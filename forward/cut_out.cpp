@@ -41,10 +41,12 @@ std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
 
 }  // namespace
 
-std::vector<int> GridView::points_about(const Vec2& x) const {
+int GridView::point_about(const Vec2& x) const {
     const int found = body.point_at(x);
-    if (found >= 0 && cracks.is_left(crack, body.points.position[found]) == cracks.is_left(crack, x)) return {found};
-    return {};
+    if (found < 0) return -1;
+    const Vec2& at = body.points.position[found];
+    const bool is_same = (at - x).squaredNorm() <= 1e-18 * body.layout.cell.squaredNorm();
+    return is_same || cracks.is_left(crack, at) == cracks.is_left(crack, x) ? found : -1;
 }
 
 std::vector<int> GridView::points_beside(const Vec2& x, const Vec2& node) const {
@@ -175,7 +177,9 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
     take([&, last = -1, about = std::vector<int>{}](int p, const Vec2&) mutable -> const std::vector<int>& {
-        if (std::exchange(last, p) != p) about = from.points_about(cracked_.points.position[p] + shift);
+        if (std::exchange(last, p) == p) return about;
+        about.clear();
+        if (const int found = from.point_about(cracked_.points.position[p] + shift); found >= 0) about.push_back(found);
         return about;
     });
     take([&](int p, const Vec2& x) { return from.points_beside(cracked_.points.position[p] + shift, x); });

@@ -16,8 +16,8 @@ struct GridView {
     Vec2 origin;  // of its lower left corner in the specimen [m]
     int crack;    // its number there
 
-    /// The point whose wood a place lies in, if it is on the same side of the crack: none or one.
-    std::vector<int> points_about(const Vec2& x) const;
+    /// The point whose wood a place lies in, if it is on the same side of the crack; -1: none.
+    int point_about(const Vec2& x) const;
 
     /// The points nearest to a place on the same side of the crack, those first whose cell holds a node or is nearest to it. More
     /// than one where they are as near, none where none is.

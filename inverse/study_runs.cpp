@@ -4,6 +4,8 @@
 #include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <memory>
 #include <numeric>
@@ -133,16 +135,19 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
     found.converged = weigh_and_descend(found.converged, enough > 0);
     if (!nearby_.turning.empty() && objective_.best()) {
+        found.method += " As the parameters turn the crack,";
         for (const double reach : {all_ways, ways_beside}) {
             const bool was_searched = reach == all_ways && starts == 1;
             if (!was_searched && is_left_over() && !objective_.exhausted()) {
                 stage("other ways");
+                found.method += fmt::format(" other ways were looked at, up to {:g} of the bounds away;", reach);
                 if (look_for_ways(objective_, nearby_, reach, options_.seed)) {
                     found.converged = descend_again();
                 }
             }
         }
         stage("closing in");
+        found.method += " the last steps took in what the turn does, told by runs a little aside.";
         found.converged = close_in(objective_, nearby_, options_.seed) && weigh_and_descend(found.converged, false);
     }
     return found;
