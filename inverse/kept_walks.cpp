@@ -153,8 +153,12 @@ class KeptWalks::Store {
                 return crack.grows != Growth::none && crack.direction != GrowthDirection::straight;
             });
             const Setting* unit = unit_of(*scene);
+            const Setting* scale = scale_of_toughness(*scene);
+            const auto turns_nothing = [&](const Setting& setting) {
+                return (unit && unit->parameter == setting.parameter) || (scale && scale->parameter == setting.parameter);
+            };
             for (const Setting& setting : settings_of_walk(*scene)) {
-                if (turns && !(unit && unit->parameter == setting.parameter)) {
+                if (turns && !turns_nothing(setting)) {
                     found.insert(static_cast<Eigen::Index>(setting.parameter));
                 }
             }
@@ -202,6 +206,21 @@ class KeptWalks::Store {
             unit = unit ? unit : &*found;
         }
         return unit;
+    }
+
+    // One of a scene's toughnesses, where the fit changes all: with all so many times as large a crack goes the same way.
+    const Setting* scale_of_toughness(const Scene& scene) const {
+        const Setting* scale = nullptr;
+        for (const auto& [name, material] : scene.materials) {
+            const auto found =
+                std::find_if(toughness_.begin(), toughness_.end(),
+                             [key = "materials." + name + ".toughness"](const Setting& s) { return s.key == key; });
+            if (found == toughness_.end()) {
+                return nullptr;
+            }
+            scale = &*found;
+        }
+        return scale;
     }
 
     // The scene with that stiffness at its initial value, and all other stress in proportion.

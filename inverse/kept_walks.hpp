@@ -50,7 +50,7 @@ class KeptWalks {
     /// Whether other toughnesses send a crack another way.
     bool turn_with_toughness() const;
 
-    /// The parameters that turn a crack's way, but for one that gives all stress its unit.
+    /// The parameters that turn a crack's way, but for one that gives all stress its unit and one that all toughness goes with.
     std::vector<Eigen::Index> turning() const;
 
     /// In which parameters runs near a point are exact [parameters].

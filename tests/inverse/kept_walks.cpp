@@ -186,6 +186,27 @@ TEST(UnitStressUnit, IsRefusedWhereOtherStressHasASay) {
               (std::vector<std::string>{"materials.EW.E_R", "materials.EW.E_T", "materials.EW.G_RT", "materials.LW.E"}));
 }
 
+// All moduli, or all toughnesses, so many times as large turn nothing: of two one is left that does.
+TEST(UnitKeptWalks, KnowsWhatTurnsACrack) {
+    const auto turning = [](GrowthDirection direction, const std::vector<std::string>& keys) {
+        Study study = toughness_study(across_inclined_rings(direction));
+        study.parameters.resize(keys.size(), study.parameters.front());
+        for (std::size_t k = 0; k < keys.size(); ++k) {
+            study.parameters[k].keys = {"materials." + keys[k]};
+        }
+        return KeptWalks(study).turning();
+    };
+    using Parameters = std::vector<Eigen::Index>;
+    const auto opening = GrowthDirection::normal_to_opening, release = GrowthDirection::energy_release_rate;
+    EXPECT_EQ(turning(opening, {"EW.toughness", "LW.toughness"}), Parameters{});
+    EXPECT_EQ(turning(release, {"EW.toughness", "LW.toughness"}), Parameters{0});
+    EXPECT_EQ(turning(release, {"LW.toughness"}), Parameters{0});
+    EXPECT_EQ(turning(opening, {"EW.E", "EW.toughness", "LW.E"}), Parameters{2});  // the other one is the unit
+    EXPECT_EQ(turning(opening, {"EW.toughness", "LW.E"}), Parameters{1});
+    EXPECT_EQ(turning(release, {"EW.E", "EW.toughness", "LW.E", "LW.toughness"}).size(), 2u);
+    EXPECT_EQ(turning(GrowthDirection::straight, {"EW.E", "LW.E"}), Parameters{});
+}
+
 // Moduli turn the crack, and a point of the grid that it passes on the other side is a jump of the misfit: the true values lie
 // behind several of those.
 TEST(SystemTurningFit, FindsModuliAndToughnessesOfDataWithoutNoise) {
