@@ -135,20 +135,21 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
     found.converged = weigh_and_descend(found.converged, enough > 0);
     if (!nearby_.turning.empty() && objective_.best()) {
-        found.method += " As the parameters turn the crack,";
+        const bool is_fine = widening_ == 1.0, goes_on = starts == 1;  // from a search on wide cells
         for (const double reach : {all_ways, ways_beside}) {
-            const bool was_searched = reach == all_ways && starts == 1;
-            if (!was_searched && is_left_over() && !objective_.exhausted()) {
+            if ((reach == all_ways ? !goes_on : is_fine) && is_left_over()) {
                 stage("other ways");
-                found.method += fmt::format(" other ways were looked at, up to {:g} of the bounds away;", reach);
                 if (look_for_ways(objective_, nearby_, reach, options_.seed)) {
                     found.converged = descend_again();
+                    found.method += fmt::format(" Of other ways, up to {:g} of the bounds away, one was better.", reach);
                 }
             }
         }
-        stage("closing in");
-        found.method += " the last steps took in what the turn does, told by runs a little aside.";
-        found.converged = close_in(objective_, nearby_, options_.seed) && weigh_and_descend(found.converged, false);
+        if (is_fine) {
+            stage("closing in");
+            found.converged = found.converged && close_in(objective_, nearby_, options_.seed) && weigh_and_descend(true, false);
+            found.method += " The last steps took in how the parameters turn the crack, told by runs a little aside.";
+        }
     }
     return found;
 }

@@ -268,15 +268,16 @@ std::vector<Eigen::VectorXd> lowest_of_starts(Objective& objective, const Nearby
 }  // namespace
 
 bool close_in(Objective& objective, const Nearby& nearby, unsigned seed) {
-    if (!objective.best() || objective.exhausted()) {
-        return false;
-    }
     double radius = last_radius;
-    for (int in_vain = 0; in_vain < most_unconfirmed && !objective.exhausted();) {
+    int in_vain = 0;
+    while (in_vain < most_unconfirmed) {
+        if (objective.exhausted()) {
+            return false;
+        }
         const Run here = *objective.best();
         const double misfit = here.evaluation->misfit;
         if (misfit < rounding * static_cast<double>(here.evaluation->residuals.size())) {
-            break;
+            return !objective.stopped();
         }
         const Objective::Evaluate model =
             mended(nearby.near(here.x), here.x,
@@ -284,7 +285,7 @@ bool close_in(Objective& objective, const Nearby& nearby, unsigned seed) {
         const Window window = Window::around(here.x, Eigen::VectorXd::Constant(here.x.size(), radius));
         const Lowest trial = lowest(model, window, here.x, true, objective.threads(), objective.stop(), seed);
         if (!is_worth_a_run(*here.evaluation, misfit - trial.misfit)) {
-            break;
+            return !objective.stopped();
         }
         objective.at(trial.x);
         const double step = (trial.x - here.x).cwiseAbs().maxCoeff();
@@ -299,6 +300,9 @@ bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, uns
     const Run here = *objective.best();
     const auto dimensions = static_cast<Eigen::Index>(nearby.turning.size());
     const int ways = ways_a_parameter * static_cast<int>(dimensions);
+    if (objective.budget_left() < 2 * ways) {
+        return false;
+    }
     Eigen::VectorXd half = Eigen::VectorXd::Constant(here.x.size(), first_radius);
     std::vector<Eigen::VectorXd> places(static_cast<std::size_t>(ways), here.x);
     const std::vector<Eigen::VectorXd> even = sobol_points(ways, dimensions, seed);

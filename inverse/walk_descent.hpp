@@ -48,7 +48,8 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
 bool close_in(Objective& objective, const Nearby& nearby, unsigned seed);
 
 /// Looks at ways on both sides of the best run's, as far as `reach` in each parameter that turns them [of the box]: a run goes
-/// each way, and the lowest point of what lies nearby is tried. Whether one was lower.
+/// each way, and the lowest point of what lies nearby is tried; none where that would take more than half of the runs left.
+/// Whether one was lower.
 bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed);
 
 /// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
