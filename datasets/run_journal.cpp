@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <fcntl.h>
 #include <optional>
 #include <sys/file.h>
@@ -42,7 +41,7 @@ class Reader {
         if (bytes_.size() < size) {
             return false;
         }
-        std::memcpy(value, bytes_.data(), size);
+        std::copy_n(bytes_.data(), size, static_cast<char*>(value));  // of nothing too
         bytes_.remove_prefix(size);
         return true;
     }
