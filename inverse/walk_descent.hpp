@@ -24,8 +24,8 @@ struct Nearby {
     Near rough;               // the same from what is known already, at no equilibria; for a search that `near` or a run confirms
     std::vector<bool> exact;  // [parameters] in which they are; in the others to first order
     bool ways_differ;         // with every parameter from point to point, which they do not see
-    /// Parameters that turn the ways where runs nearby hang on no others: a run is needed for each way, and that says all about
-    /// what else there is.
+    /// Parameters that turn the ways, where runs nearby hang on no others; of those that turn nothing together all but one, so
+    /// that these meet every way.
     std::vector<Eigen::Index> turning = {};
     /// The lowest point in a window about `point`: what the search finds, or has found before. May be empty.
     std::function<Lowest(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search)>

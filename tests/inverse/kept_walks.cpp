@@ -2,6 +2,7 @@
 #include "forward/simulate.hpp"
 #include "inverse/fit.hpp"
 #include "inverse/stress_unit.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -240,7 +241,10 @@ TEST(SystemTurningFit, FindsModuliAndToughnessesOfDataWithoutNoise) {
             parameter.upper = truth[k] * 5;
             parameter.scale = Scale::logarithmic;
         }
-        const Fit fit = fit_study(study, {});
+        const TemporaryFolder folder;
+        FitOptions options;
+        options.keeping = {folder / "fit.runs", false};
+        const Fit fit = fit_study(study, options);
         std::printf("%d runs in %.1f s, misfit %.1e", static_cast<int>(fit.runs.size()), fit.seconds, fit.misfit);
         for (int k = 0; k < 4; ++k) {
             const double error = fit.parameters[k].value / truth[k] - 1;
@@ -249,6 +253,21 @@ TEST(SystemTurningFit, FindsModuliAndToughnessesOfDataWithoutNoise) {
         }
         std::printf("\n");
         EXPECT_EQ(fit.status, FitStatus::converged);
+
+        // Half of it again, with another number of threads.
+        if (direction != GrowthDirection::hoop_stress) {
+            continue;
+        }
+        const std::string bytes = folder.read("fit.runs");
+        folder.write("fit.runs", bytes.substr(0, bytes.size() / 2));
+        options.keeping.resume = true;
+        options.threads = 1;
+        const Fit resumed = fit_study(study, options);
+        ASSERT_EQ(resumed.runs.size(), fit.runs.size());
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_EQ(resumed.parameters[k].value, fit.parameters[k].value);
+            EXPECT_EQ(resumed.parameters[k].upper_95, fit.parameters[k].upper_95);
+        }
     }
 }
 

@@ -342,7 +342,8 @@ TEST(UnitResiduals, AStationThatIsNeverReachedIsFiniteAndContinuous) {
 }
 
 // A test that ends with a jump, in its last two rows at one displacement or between them, says when that was; a model whose jump
-// is earlier or later by a part of a window is off by that, however little it is.
+// is earlier or later by a part of a window is off by that, however little it is; within a fifth, as between its nodes, which are
+// other ones then, the smoothed curve is taken to be straight.
 TEST(UnitResiduals, AJumpAtTheEndIsTimedContinuously) {
     const auto ends_with_jump = [](double at, bool goes_on) {
         Record record = straight(1e5, 1, 1e-3, 201);
