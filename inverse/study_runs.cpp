@@ -17,7 +17,7 @@ constexpr double all_ways = 1.0;       // of the box, to either side
 constexpr double ways_beside = 0.01;   // farther than from one jump of the misfit, as the grid sees ways, to the next
 constexpr double nothing_left = 1e-6;  // of what noise leaves
 
-constexpr int most_weighings = 4;     // by another resolution of the model
+constexpr int most_weighings = 6;     // by another resolution of the model
 constexpr double least_change = 0.1;  // of a sigma, that they are made for
 
 // All that the lowest point of a cheap model hangs on beyond what the runs do.
@@ -132,7 +132,8 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
     const std::vector<int> lengths = model_.curves().lengths;
     const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
-    SearchResult found = descend_by_walks(objective_, nearby_, starts, enough, initial, options_.seed, stage);
+    const auto is_enough = [enough](const Evaluation& best) { return best.misfit < enough; };
+    SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
     found.converged = weigh_and_descend(found.converged, enough > 0);
     if (!nearby_.turning.empty() && objective_.best()) {
         const bool is_fine = widening_ == 1.0, goes_on = starts == 1;  // from a search on wide cells
@@ -158,7 +159,15 @@ SearchResult StudyRuns::descend(const std::function<void(const std::string&)>& s
     return descend(std::max(study_.optimizer.starts, least_starts_where_unexplained), model_.box().initial(), stage);
 }
 
-bool StudyRuns::descend_again() { return weigh_and_descend(crampfit::descend_again(objective_, nearby_, options_.seed), false); }
+bool StudyRuns::descend_again() { return weigh_and_descend(descend_as_weighed(false), false); }
+
+// From the best run on to the lowest point, or, but for the last time, to where a step says that runs weigh otherwise.
+bool StudyRuns::descend_as_weighed(bool last) {
+    const auto weighs_otherwise = [this, last](const Evaluation& best) {
+        return !last && model_.change_of_sigma(model_.likely_resolution(best, solver_resolution)) > least_change;
+    };
+    return crampfit::descend_again(objective_, nearby_, weighs_otherwise, options_.seed);
+}
 
 SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage) {
     SearchResult found = crampfit::search(objective_, study_.optimizer, initial, options_.seed, stage);
@@ -209,7 +218,7 @@ bool StudyRuns::weigh_and_descend(bool converged, bool ended_early) {
         if (!goes_on && !(round == 0 && ended_early)) {
             break;
         }
-        converged = crampfit::descend_again(objective_, nearby_, options_.seed);
+        converged = descend_as_weighed(round + 1 == most_weighings);
     }
     return converged;
 }

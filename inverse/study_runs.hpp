@@ -56,6 +56,7 @@ class StudyRuns {
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
     bool weigh_anew(double least_change);
     bool is_left_over() const;
+    bool descend_as_weighed(bool last);
     bool weigh_and_descend(bool converged, bool ended_early);
     Evaluation run(const Eigen::VectorXd& x, int share);
     Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;

@@ -129,11 +129,13 @@ bool is_worth_a_run(const Evaluation& here, double gain) {
 }
 
 struct Descent {
-    bool converged;          // it ended by its own criterion
-    double unconfirmed = 0;  // gain of the misfit that its last steps promised and no run confirmed
+    bool converged;           // it ended by its own criterion, or early
+    double unconfirmed = 0;   // gain of the misfit that its last steps promised and no run confirmed
+    bool was_enough = false;  // it ended early
 };
 
-Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, double enough, unsigned seed) {
+Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, const Enough& enough,
+                     unsigned seed) {
     objective.at(start);
     Eigen::VectorXd reach(start.size());  // in radii
     for (Eigen::Index j = 0; j < reach.size(); ++j) {
@@ -142,10 +144,10 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
     double radius = first_radius, unconfirmed = 0;
     int in_vain = 0;
     while (objective.best() && !objective.exhausted() && radius >= least_radius && in_vain < most_unconfirmed) {
-        if (objective.best()->evaluation->misfit < enough) {
-            return {true};
-        }
         const Run here = *objective.best();
+        if (enough(*here.evaluation)) {
+            return {true, 0, true};
+        }
         const double misfit = here.evaluation->misfit;
         Lowest trial = lowest_near(here.x, nearby, true, Window::around(here.x, radius * reach), objective, seed);
         if (!is_worth_a_run(*here.evaluation, misfit - trial.misfit)) {
@@ -336,18 +338,18 @@ bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, uns
     return objective.best()->evaluation->misfit < here.evaluation->misfit;
 }
 
-bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed) {
+bool descend_again(Objective& objective, const Nearby& nearby, const Enough& enough, unsigned seed) {
     const Eigen::VectorXd start = objective.best()->x;
-    const bool converged = descend_from(objective, nearby, start, 0.0, seed).converged;
-    if (!nearby.ways_differ) {
-        return converged;
+    const Descent descent = descend_from(objective, nearby, start, enough, seed);
+    if (!nearby.ways_differ || descent.was_enough) {
+        return descent.converged;
     }
     // From way to way the misfit is rough. Polynomials of the runs themselves see past that.
     return nearby.turning.empty() ? minimize(objective, Eigen::VectorXd(objective.best()->x), {"auto", seed}).converged
                                   : close_in(objective, nearby, seed);
 }
 
-SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, const Enough& enough,
                               const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage) {
     const int p = static_cast<int>(initial.size());

@@ -18,6 +18,9 @@ struct Lowest {
     double misfit;
 };
 
+/// Whether a descent may end early, after a step, at its best run.
+using Enough = std::function<bool(const Evaluation& best)>;
+
 /// What a run leaves behind: a cheap model of the runs nearby.
 struct Nearby {
     Near near;
@@ -35,11 +38,10 @@ struct Nearby {
 /// Least squares where a run leaves behind a cheap model of the runs nearby: each step searches that model within a trust
 /// region, runs the study where the model is lowest, and goes on from there if that is lower (Conn, Gould and Toint 2000,
 /// algorithm 6.1.1). The model is searched from several points, so that a curve with jumps does not easily catch it in a side
-/// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. A descent may end early, where
-/// the misfit is below `enough`. It starts from `initial`, and from further Sobol points of the box, up to `starts`, as long as
-/// the noise does not explain the misfit (residuals above two sigma). Where ways differ it starts from the lowest of some more
-/// such points anyway.
-SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, double enough,
+/// valley. The search asks `rough`; where that promises nothing more, `near` has the last word. It starts from `initial`, and
+/// from further Sobol points of the box, up to `starts`, as long as the noise does not explain the misfit (residuals above two
+/// sigma). Where ways differ it starts from the lowest of some more such points anyway.
+SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int starts, const Enough& enough,
                               const Eigen::VectorXd& initial, unsigned seed,
                               const std::function<void(const std::string&)>& stage);
 
@@ -52,8 +54,7 @@ bool close_in(Objective& objective, const Nearby& nearby, unsigned seed);
 /// Whether one was lower.
 bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed);
 
-/// One more such descent to its end, from the best run, after runs have been weighed anew. Whether it ended by its own
-/// criterion.
-bool descend_again(Objective& objective, const Nearby& nearby, unsigned seed);
+/// One more such descent from the best run, after runs have been weighed anew. Whether it ended by its own criterion, or early.
+bool descend_again(Objective& objective, const Nearby& nearby, const Enough& enough, unsigned seed);
 
 }  // namespace crampfit

@@ -30,6 +30,8 @@ Eigen::VectorXd residuals_near(const Eigen::VectorXd& point, const Eigen::Vector
 
 Evaluation evaluation(const Eigen::VectorXd& r) { return {"finished", r, r, r.squaredNorm(), 0.0}; }
 
+bool never(const Evaluation&) { return false; }
+
 TEST(UnitWalkDescent, FindsTheLowestPointInFewRuns) {
     for (const auto& [first, second] : {std::pair{0.1, 0.9}, {0.9, 0.1}, {0.5, 0.6}}) {
         Objective objective(
@@ -37,7 +39,7 @@ TEST(UnitWalkDescent, FindsTheLowestPointInFewRuns) {
         const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
             return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
         };
-        const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0,
+        const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, never,
                                                     Eigen::Vector2d(first, second), 1, [](const std::string&) {});
         ASSERT_NE(objective.best(), nullptr);
         const Eigen::VectorXd best = objective.best()->x;
@@ -65,7 +67,7 @@ TEST(UnitWalkDescent, FindsTheSamePointWhereRunsFail) {
         };
         const Eigen::Vector2d start(0.1, 0.9);
         const Nearby nearby{near, near, {true, false}, false};
-        const SearchResult found = descend_by_walks(objective, nearby, 1, 0.0, start, seed, [](const std::string&) {});
+        const SearchResult found = descend_by_walks(objective, nearby, 1, never, start, seed, [](const std::string&) {});
         const auto is_lost = [](const crampfit::Run& run) { return !run.evaluation->usable(); };
         failed += static_cast<int>(std::count_if(objective.runs().begin(), objective.runs().end(), is_lost));
         alone += fails(start);
@@ -84,8 +86,8 @@ TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
     const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
         return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
     };
-    const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, 0.0, Eigen::Vector2d(0.1, 0.9),
-                                                1, [](const std::string&) {});
+    const SearchResult found = descend_by_walks(objective, {near, near, {true, false}, false}, 1, never,
+                                                Eigen::Vector2d(0.1, 0.9), 1, [](const std::string&) {});
     EXPECT_FALSE(found.converged);
     EXPECT_EQ(objective.runs().size(), 2u);
 }
