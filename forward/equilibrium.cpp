@@ -3,6 +3,7 @@
 #include "forward/deformation.hpp"
 #include "forward/local_yield.hpp"
 #include "forward/seen_strain.hpp"
+#include "forward/side_by_side.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -50,13 +51,16 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed_at_rest),
       boundary_(scene, body, cracks_, &materials), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
-      internal_force_(body, materials, plan.rotates, history_.get()), factor_(body.layout.cells_x, body.layout.cells_y, threads) {
+      internal_force_(body, materials, plan.rotates, history_.get()), side_by_side_(threads > 1),
+      factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
         sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
-        let_yield(sliding_.back(), boundary_.travel(sliding_driver_.back(), std::min(plan.end_time, plan.still_from)));
     }
+    do_side_by_side(side_by_side_, sliding_.size(), [&](std::size_t s) {
+        let_yield(sliding_[s], boundary_.travel(sliding_driver_[s], std::min(plan.end_time, plan.still_from)));
+    });
     displacement_.assign(cracks_.fields(), Vec2::Zero());
     double stiffest = 0.0;
     for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));

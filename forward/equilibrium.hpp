@@ -231,6 +231,7 @@ class Equilibrium {
     double next_time_ = 0;                     // that is being solved for [s]
     std::vector<Vec2> still_to_go_;            // [drivers] until then [m]
 
+    bool side_by_side_;  // what does not hang together
     GridFactor factor_;
     LoosePieces pieces_;         // that cracks have cut free
     std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis

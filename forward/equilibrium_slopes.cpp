@@ -1,6 +1,7 @@
 #include "forward/deformation.hpp"
 #include "forward/equilibrium.hpp"
 #include "forward/local_yield.hpp"
+#include "forward/side_by_side.hpp"
 
 #include <algorithm>
 
@@ -125,6 +126,9 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         }
     }
     // So are bodies' springs.
+    do_side_by_side(side_by_side_, sliding_.size(), [&](std::size_t s) {
+        if (LocalYield* yield = sliding_[s].yield()) yield->know_slopes(numbers);
+    });
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
         const std::vector<SlidingBody::Touch> touches = sliding_[s].touches(place_of(sliding_driver_[s]), displacement_);
         for (std::size_t n = 0; n < numbers.size(); ++n) {

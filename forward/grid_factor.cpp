@@ -1,11 +1,12 @@
 #include "forward/grid_factor.hpp"
 
+#include "forward/side_by_side.hpp"
+
 #include <Eigen/Cholesky>
 #include <cblas.h>
 
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -26,17 +27,9 @@ constexpr int small_front = 48;
 // So many right sides are solved without the BLAS.
 constexpr int few_columns = 3;
 
-// Runs two tasks side by side, or one after the other.
 template <class First, class Second>
 void run_both(bool side_by_side, const First& first, const Second& second) {
-    if (!side_by_side) {
-        first();
-        second();
-        return;
-    }
-    auto other = std::async(std::launch::async, first);
-    second();
-    other.get();
+    do_side_by_side(side_by_side, 2, [&](std::size_t k) { k == 0 ? first() : second(); });
 }
 
 }  // namespace
@@ -44,7 +37,7 @@ void run_both(bool side_by_side, const First& first, const Second& second) {
 GridFactor::GridFactor(int cells_x, int cells_y, int threads) : cells_x_(cells_x), cells_y_(cells_y) {
     while (1 << forks_ < threads && forks_ < most_forks) ++forks_;
     // Runs of a fit go side by side, a core each; and sums must not depend on the number of threads.
-    openblas_set_num_threads(1);
+    [[maybe_unused]] static const bool alone = (openblas_set_num_threads(1), true);  // once: it is not safe side by side
     const std::size_t nodes = static_cast<std::size_t>(cells_x + 1) * (cells_y + 1);
     place_.assign(nodes, -1);
     box_of_cell_.assign(static_cast<std::size_t>(cells_x) * cells_y, -1);

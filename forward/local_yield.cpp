@@ -150,7 +150,7 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
 
 // A function f of a symmetric matrix A = V diag(a) V^T has the slope V (F o V^T A' V) V^T with F_ij = (f(a_i) - f(a_j)) / (a_i -
 // a_j), or f'(a_i) (Daleckii and Krein 1965).
-void LocalYield::find_slopes(const std::vector<MaterialSlope>& numbers) {
+void LocalYield::know_slopes(const std::vector<MaterialSlope>& numbers) {
     if (slopes_.size() == numbers.size()) return;
     slopes_.assign(numbers.size(), Eigen::MatrixXd::Zero(stations_, stations_));
     fine_->add_slopes(numbers, 1.0, slopes_);
@@ -196,7 +196,7 @@ LocalYield::Pressed LocalYield::pressed(const std::vector<SlidingBody::Touch>& t
 // takes N^T P A P^T N / 2; the slope of the energy with s as it is: -N^T P A' P^T N / 2.
 LocalYield::Slope LocalYield::slope(const std::vector<SlidingBody::Touch>& touches, Eigen::VectorXd forces,
                                     const std::vector<MaterialSlope>& numbers, std::size_t number) {
-    find_slopes(numbers);
+    know_slopes(numbers);
     const Pressed at = pressed(touches);
     Eigen::VectorXd force(touches.size());
     for (std::size_t k = 0; k < touches.size(); ++k) force[k] = touches[k].force;

@@ -48,6 +48,9 @@ class LocalYield {
     };
     Pressed pressed(const std::vector<SlidingBody::Touch>& touches) const;
 
+    /// Finds the slopes of the yield by these numbers, which `slope` asks for: once, and for several wheels side by side.
+    void know_slopes(const std::vector<MaterialSlope>& numbers);
+
     /// Slopes by a number of the energy and of the facets' forces, displacements as they are.
     struct Slope {
         double energy = 0;       // that the yield takes [J / unit]
@@ -67,7 +70,6 @@ class LocalYield {
     LocalYield() = default;
     std::vector<int> place_stations(const Box& where, const std::vector<Facet>& facets, double pitch);
     std::vector<Load> loads(const std::vector<int>& held, const std::vector<Facet>& facets) const;
-    void find_slopes(const std::vector<MaterialSlope>& numbers);
 
     int first_ = 0, stations_ = 0;
     std::vector<Place> places_;   // by facet, from the first on; station -1: not held

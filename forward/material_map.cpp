@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <unordered_map>
 
 namespace crampfit {
@@ -97,8 +98,23 @@ struct MaterialMap::Known {
             return all ^ (all >> 32);
         }
     };
-    std::unordered_map<Rectangle, LocalWood, Hash> average;
-    std::unordered_map<Rectangle, Unevenness, Hash> unevenness;
+    template <class Value>
+    using Table = std::unordered_map<Rectangle, Value, Hash>;
+
+    // What a table has of a rectangle, or else what is found; parts may be looked at side by side.
+    template <class Value, class Find>
+    Value of(Table<Value>& table, const Rectangle& where, const Find& find) {
+        std::unique_lock lock(mutex);
+        if (const auto known = table.find(where); known != table.end()) return known->second;
+        lock.unlock();
+        const Value found = find();
+        lock.lock();
+        return table.emplace(where, found).first->second;
+    }
+
+    std::mutex mutex;
+    Table<LocalWood> average;
+    Table<Unevenness> unevenness;
 };
 
 MaterialMap MaterialMap::part(const Vec2& corner) const {
@@ -364,9 +380,7 @@ LocalWood MaterialMap::average(WoodArea& area) const {
     const Vec2 x = area.centre + corner_;
     if (const LocalWood* wood = band_around(x, area.half)) return *wood;
     if (!is_part_) return find_average(area);
-    const auto [known, missing] = known_->average.try_emplace(rectangle(x, area.half, Vec2::Zero()));
-    if (missing) known->second = find_average(area);
-    return known->second;
+    return known_->of(known_->average, rectangle(x, area.half, Vec2::Zero()), [&] { return find_average(area); });
 }
 
 // How many samples an area has a side.
@@ -418,9 +432,8 @@ LocalWood MaterialMap::find_average(WoodArea& area) const {
 Unevenness MaterialMap::unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {
     if (!average.mixed || average.filled < 1.0) return {};
     if (!is_part_) return find_unevenness(area, average, spread);
-    const auto [known, missing] = known_->unevenness.try_emplace(rectangle(area.centre + corner_, area.half, spread));
-    if (missing) known->second = find_unevenness(area, average, spread);
-    return known->second;
+    return known_->of(known_->unevenness, rectangle(area.centre + corner_, area.half, spread),
+                      [&] { return find_unevenness(area, average, spread); });
 }
 
 Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {

@@ -1,11 +1,11 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/side_by_side.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <future>
 #include <limits>
 
 namespace crampfit {
@@ -204,12 +204,11 @@ void Quasistatic::keep(std::size_t number, int time, LoadState state) {
 }
 
 // Solves for something on both grids; whether it succeeded on the second, and on this one.
-template <class Second, class Own>
-std::pair<bool, bool> Quasistatic::on_both_grids(const Second& second, const Own& own) {
+std::pair<bool, bool> Quasistatic::on_both_grids(const std::function<bool()>& second, const std::function<bool()>& own) {
     if (!coarse_) return {true, own()};
-    std::future<bool> other = std::async(coarse_->side_by_side ? std::launch::async : std::launch::deferred, second);
-    const bool good = own();
-    return {other.get(), good};
+    std::array<bool, 2> good{};
+    do_side_by_side(coarse_->side_by_side, 2, [&](std::size_t k) { good[k] = k == 0 ? own() : second(); });
+    return {good[1], good[0]};
 }
 
 // In a linear scene no load and full load say all; the state half way is between them.

@@ -6,6 +6,7 @@
 
 #include <compare>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -149,8 +150,7 @@ class Quasistatic {
     bool guess(std::size_t number, int time);
     void forget_guesses();
     bool find(std::size_t number, int time);
-    template <class Second, class Own>
-    std::pair<bool, bool> on_both_grids(const Second& second, const Own& own);
+    std::pair<bool, bool> on_both_grids(const std::function<bool()>& second, const std::function<bool()>& own);
     bool know_linear(std::size_t number);
     bool solve_for(std::size_t number, int time);
     std::optional<Way> way_to(int number, int time, const std::map<int, Known>& known) const;

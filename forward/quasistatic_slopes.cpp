@@ -207,16 +207,18 @@ void Quasistatic::shift(const std::vector<double>& by) {
 bool Quasistatic::know_slopes(std::size_t number, int time) {
     Place& place = places_[number];
     if (place.slopes.count(time)) return true;
-    if (coarse() && !coarse()->know_slopes(number, time)) return false;
     Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};  // of what carries nothing
-    const auto known = place.known.find(time);
-    if (known != place.known.end() && (time > 0 || equilibrium_.boundary().has_dead_load())) {
+    const auto find = [&] {
+        const auto known = place.known.find(time);
+        if (known == place.known.end() || (time == 0 && !equilibrium_.boundary().has_dead_load())) return true;
         enter(place);
         equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
         auto here = slopes_here(missed_at(number, true));
-        if (!here) return false;
-        slopes = std::move(*here);
-    }
+        if (here) slopes = std::move(*here);
+        return here.has_value();
+    };
+    const auto [second, good] = on_both_grids([&] { return coarse()->know_slopes(number, time); }, find);
+    if (!second || !good) return false;
     keep_slopes(number, time, std::move(slopes));
     return true;
 }

@@ -17,9 +17,6 @@
 namespace crampfit {
 namespace {
 
-// Walks that are kept at a time: a fit of moduli leaves each one behind after a few runs.
-constexpr std::size_t most_walks = 6;
-
 struct Setting {
     std::string key;
     std::size_t parameter;
@@ -291,20 +288,21 @@ class KeptWalks::Store {
         return std::make_shared<KeptWalk>(scene, numbers, threads_);
     }
 
-    // Those that are in use at a time: with bodies, where runs go on from one another, of one point and of the one before. Else
-    // of some ways side by side, or of a point and of those aside of it in each parameter.
+    // Those that are in use at a time. With bodies, where each may take half a gigabyte: of the best point, of the one tried, and
+    // of the one that was best before. Else of some ways side by side, or of a point and of those aside of it in each parameter.
     std::size_t walks_of_a_scene() const {
         const bool has_bodies = std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* s) { return !s->bodies.empty(); });
-        return has_bodies ? 2 : std::max<std::size_t>(5, others_.size() + (turn_with_toughness() ? toughness_.size() : 0) + 2);
+        return has_bodies ? 3 : std::max<std::size_t>(6, others_.size() + (turn_with_toughness() ? toughness_.size() : 0) + 2);
     }
 
     Entry& entry_of(const std::string& name) {
         const auto known = std::find_if(walks_.begin(), walks_.end(), [&](const Entry& entry) { return entry.name == name; });
         if (known != walks_.end()) {
-            return *known;
+            std::rotate(known, known + 1, walks_.end());  // to the back, as the one used last
+            return walks_.back();
         }
         walks_.push_back({name, nullptr});
-        if (walks_.size() > std::max(most_walks, walks_of_a_scene() * scenes_.size())) {
+        if (walks_.size() > walks_of_a_scene() * scenes_.size()) {
             std::erase_if(put_off_, [&](const Work& work) { return work.walk == walks_.front().name; });
             walks_.pop_front();
         }
