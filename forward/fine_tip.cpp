@@ -1,9 +1,11 @@
 #include "forward/fine_tip.hpp"
 
 #include "forward/deformation.hpp"
+#include "forward/side_by_side.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <span>
 
 namespace crampfit {
@@ -205,8 +207,9 @@ bool TipBoxes::hold(const Vec2& tip, const Vec2& cell) const {
 }
 
 FineTip::FineTip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
-                 const std::vector<MaterialSlope>& numbers)
-    : scene_(scene), materials_(materials), body_(body), numbers_(numbers), rotates_(plan.rotates), small_(plan) {
+                 const std::vector<MaterialSlope>& numbers, bool side_by_side)
+    : scene_(scene), materials_(materials), body_(body), numbers_(numbers), rotates_(plan.rotates), side_by_side_(side_by_side),
+      small_(plan) {
     small_.rotates = small_.friction = false;
     small_.linear = true;
 }
@@ -234,7 +237,8 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, const TipWay& 
 
 // The one that has been solved with this crack, or one from whose crack it goes on, but for one that is in use: where there is
 // little room two boxes may be the same.
-CutOut& FineTip::cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use) {
+std::shared_ptr<CutOut> FineTip::cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end,
+                                     const CutOut* in_use) {
     auto found = kept_.end();
     std::shared_ptr<CutOutWood> wood;
     for (auto one = kept_.begin(); one != kept_.end(); ++one) {
@@ -249,23 +253,60 @@ CutOut& FineTip::cut(const Box& box, const Vec2& cell, const CrackLine& line, in
     if (found == kept_.end()) {
         if (!wood) wood = std::make_shared<CutOutWood>(scene_, materials_, box, cell);
         if (kept_.size() == most_kept) kept_.pop_back();
-        kept_.push_front(std::make_unique<CutOut>(scene_, small_, numbers_, std::move(wood)));
+        kept_.push_front(std::make_shared<CutOut>(scene_, small_, numbers_, std::move(wood)));
     } else {
         std::rotate(kept_.begin(), found, found + 1);
     }
-    return *kept_.front();
+    return kept_.front();
 }
 
-MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes) {
+// Each box with cells as they are and half as wide; none where nothing is missed.
+FineTip::Parts FineTip::parts_of(const TipPlace& place, const Equilibrium& equilibrium) {
+    const auto& [about, crack, at_end] = place;
     const CrackFields& cracks = equilibrium.cracks();
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    if (opening <= 0.0 || !stands_alone(scene_, body_.layout, cracks, crack, place.boxes[0], {}) ||
-        touches_itself(body_, place.boxes[0], equilibrium, crack) ||
-        is_pressed(scene_, body_, place.boxes[0], equilibrium, small_.free_bodies))
+    const Box& outermost = about.boxes[0];
+    if (opening <= 0.0 || !stands_alone(scene_, body_.layout, cracks, crack, outermost, {}) ||
+        touches_itself(body_, outermost, equilibrium, crack) ||
+        is_pressed(scene_, body_, outermost, equilibrium, small_.free_bodies))
         return {};
+    Parts parts;
+    Vec2 cell = body_.layout.cell;
+    for (const Box& box : about.boxes) {
+        for (std::vector<std::shared_ptr<CutOut>>* of : {&parts.coarse, &parts.fine}) {
+            const Vec2 width = of == &parts.fine ? Vec2(0.5 * cell) : cell;
+            of->push_back(cut(box, width, line, crack, at_end, parts.fine.empty() ? nullptr : parts.fine.back().get()));
+        }
+        cell *= 0.5;
+    }
+    return parts;
+}
 
+std::vector<MissedEnergy> FineTip::missed(const std::vector<TipPlace>& places, const Equilibrium& equilibrium, bool with_slopes) {
+    std::vector<Parts> parts;
+    std::set<const CutOutWood*> woods;
+    std::size_t count = 0;
+    for (const TipPlace& place : places) {
+        std::set<const CutOutWood*> own;
+        parts.push_back(parts_of(place, equilibrium));
+        for (const auto* of : {&parts.back().coarse, &parts.back().fine})
+            for (const auto& part : *of) own.insert(part->wood().get());
+        count += own.size();
+        woods.merge(own);
+    }
+    std::vector<MissedEnergy> found(places.size());
+    do_side_by_side(side_by_side_ && woods.size() == count, places.size(), [&](std::size_t k) {
+        if (!parts[k].fine.empty()) found[k] = missed(places[k], parts[k], equilibrium, with_slopes);
+    });
+    return found;
+}
+
+MissedEnergy FineTip::missed(const TipPlace& tip, const Parts& parts, const Equilibrium& equilibrium, bool with_slopes) const {
+    const auto& [place, crack, at_end] = tip;
+    const CrackFields& cracks = equilibrium.cracks();
+    const CrackLine& line = cracks.lines[crack];
     // Small strain: of what is left when the turn of the box as a whole is taken off.
     Mat2 gradient = Mat2::Zero(), turn = Mat2::Identity();
     std::vector<Vec2> displacement = equilibrium.displacements();
@@ -278,26 +319,20 @@ MissedEnergy FineTip::missed(const TipBoxes& place, const Equilibrium& equilibri
         }
     }
 
-    // Down: each box with cells as they are and half as wide.
-    std::vector<CutOut*> coarse, fine;
+    // Down.
+    const auto& [coarse, fine] = parts;
     std::vector<GridView> views{{body_, cracks, displacement, Vec2::Zero(), crack}};
-    Vec2 cell = body_.layout.cell;
     MissedEnergy missed;
-    for (const Box& box : place.boxes) {
-        for (const bool finer : {false, true}) {
-            CutOut& part = cut(box, finer ? Vec2(0.5 * cell) : cell, line, crack, at_end, fine.empty() ? nullptr : fine.back());
-            // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
-            const bool solved_there = !finer && (!rotates_ || views.size() > 1);
-            if (!part.solve(line, crack, at_end, views.back(), solved_there)) return {};
-            (finer ? fine : coarse).push_back(&part);
-        }
-        const double held = fine.back()->potential(), of = coarse.back()->potential();
+    for (std::size_t k = 0; k < fine.size(); ++k) {
+        // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
+        if (!coarse[k]->solve(line, crack, at_end, views[k], !rotates_ || k > 0)) return {};
+        if (!fine[k]->solve(line, crack, at_end, views[k], false)) return {};
+        const double held = fine[k]->potential(), of = coarse[k]->potential();
         const auto within = [&](double least, double most) { return held >= least * of && held <= most * of; };
         if (!within(far_below_coarse, far_above_coarse)) return {};
-        if (!within(least_of_coarse, most_of_coarse) && turns_sharply(line, box)) return {};
+        if (!within(least_of_coarse, most_of_coarse) && turns_sharply(line, place.boxes[k])) return {};
         missed.energy += place.share * (held - of);
-        views.push_back(fine.back()->view());
-        cell *= 0.5;
+        views.push_back(fine[k]->view());
     }
     if (!with_slopes) return missed;
 

@@ -32,6 +32,13 @@ struct TipBoxes {
     bool hold(const Vec2& tip, const Vec2& cell) const;
 };
 
+/// Boxes about the tip of a crack.
+struct TipPlace {
+    const TipBoxes& boxes;
+    int crack;
+    bool at_end;
+};
+
 /// The energy of a crack in one wood is right to some parts in a thousand of G times a cell, wherever its tip lies in a cell:
 /// `tip_lag` and the ties see to that. Where the tip passes into wood many times as stiff, G falls to nothing and rises again
 /// within a cell, and the grid gives up to twice the energy that the next cells release. So the wood around the tip is cut out
@@ -45,26 +52,32 @@ class FineTip {
   public:
     /// All must outlive this. `numbers`: of the materials, by which slopes may be asked for.
     FineTip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
-            const std::vector<MaterialSlope>& numbers);
+            const std::vector<MaterialSlope>& numbers, bool side_by_side = false);
 
     /// Boxes for a tip on the way from one place to another. None where no sharp boundary lies within 4 cells of the way, nor
     /// where there is no room for them among bodies, other cracks and the ways of their tips.
     std::optional<TipBoxes> about(const CrackFields& cracks, const TipWay& way, std::span<const TipWay> others = {}) const;
 
-    /// What is missed there with the crack as the equilibrium has it; of a closed tip nothing, nor where
-    /// another crack has come into the boxes. With its slopes by the numbers, or without.
-    MissedEnergy missed(const TipBoxes& place, const Equilibrium& equilibrium, int crack, bool at_end, bool with_slopes);
+    /// What is missed at each place with the cracks as the equilibrium has them; of a closed tip nothing, nor where another crack
+    /// has come into the boxes. With its slopes by the numbers, or without. Places that share no box may be solved side by side.
+    std::vector<MissedEnergy> missed(const std::vector<TipPlace>& places, const Equilibrium& equilibrium, bool with_slopes);
 
   private:
-    CutOut& cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end, const CutOut* in_use);
+    struct Parts {
+        std::vector<std::shared_ptr<CutOut>> coarse, fine;  // [boxes]
+    };
+    std::shared_ptr<CutOut> cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end,
+                                const CutOut* in_use);
+    Parts parts_of(const TipPlace& place, const Equilibrium& equilibrium);
+    MissedEnergy missed(const TipPlace& tip, const Parts& parts, const Equilibrium& equilibrium, bool with_slopes) const;
 
     const Scene& scene_;
     const MaterialMap& materials_;
     const Discretisation& body_;
     const std::vector<MaterialSlope>& numbers_;
-    bool rotates_;
+    bool rotates_, side_by_side_;
     Plan small_;                                // small strain, linear
-    std::deque<std::unique_ptr<CutOut>> kept_;  // those asked for last, the last one first: neighbouring places share them
+    std::deque<std::shared_ptr<CutOut>> kept_;  // those asked for last, the last one first: neighbouring places share them
 };
 
 }  // namespace crampfit

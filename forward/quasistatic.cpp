@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace crampfit {
 
@@ -72,7 +73,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                          const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body),
-      equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_) {
+      equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_, threads > 1) {
     numbers_ = MaterialSlope::of(scene, numbers, body_);
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
@@ -132,34 +133,40 @@ int Quasistatic::start_of_advance(int end) const {
     return start == places_[place].next.end() ? -1 : start->second;
 }
 
-MissedEnergy Quasistatic::missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes) {
-    MissedEnergy all;
-    for (std::size_t t = 0; t < growing_.size(); ++t) {
-        if (!boxes[t]) continue;
-        const MissedEnergy one = fine_tip_.missed(*boxes[t], equilibrium_, growing_[t].crack, growing_[t].at_end, with_slopes);
-        all.energy += one.energy;
-        if (one.by_number.empty()) continue;
-        all.by_number.resize(one.by_number.size());
-        all.by_displacement.resize(one.by_displacement.size(), Vec2::Zero());
-        for (std::size_t n = 0; n < one.by_number.size(); ++n) all.by_number[n] += one.by_number[n];
-        for (std::size_t f = 0; f < one.by_displacement.size(); ++f) all.by_displacement[f] += one.by_displacement[f];
-    }
-    return all;
-}
-
 // At a place where the equilibrium stands.
 Quasistatic::Missed Quasistatic::missed_at(std::size_t number, bool with_slopes) {
-    const Place& place = places_[number];
-    const MissedEnergy here = missed_in(place.boxes, with_slopes);
-    const int start = start_of_advance(static_cast<int>(number));
-    if (start < 0) return {here, here};
+    const std::vector<std::optional<TipBoxes>>& here = places_[number].boxes;
+    std::vector<std::optional<TipBoxes>> as_end;
+    if (const int start = start_of_advance(static_cast<int>(number)); start >= 0) as_end = places_[start].boxes;
+    std::vector<TipPlace> asked;
+    const auto ask = [&](const std::vector<std::optional<TipBoxes>>& boxes) {
+        for (std::size_t t = 0; t < boxes.size(); ++t)
+            if (boxes[t]) asked.push_back({*boxes[t], growing_[t].crack, growing_[t].at_end});
+        return asked.size();
+    };
     // A tip that has turned out of the boxes is seen in its own.
-    std::vector<std::optional<TipBoxes>> boxes = places_[start].boxes;
-    for (std::size_t t = 0; t < growing_.size(); ++t) {
+    for (std::size_t t = 0; t < as_end.size(); ++t) {
         const CrackTip& tip = equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end);
-        if (boxes[t] && tip.inside && !boxes[t]->hold(tip.position, body_.layout.cell)) boxes[t] = place.boxes[t];
+        if (as_end[t] && tip.inside && !as_end[t]->hold(tip.position, body_.layout.cell)) as_end[t] = here[t];
     }
-    return {here, missed_in(boxes, with_slopes)};
+    const std::size_t of_here = ask(here);
+    ask(as_end);
+    const std::vector<MissedEnergy> found = fine_tip_.missed(asked, equilibrium_, with_slopes);
+    const auto sum = [](std::span<const MissedEnergy> some) {
+        MissedEnergy all;
+        for (const MissedEnergy& one : some) {
+            all.energy += one.energy;
+            if (one.by_number.empty()) continue;
+            all.by_number.resize(one.by_number.size());
+            all.by_displacement.resize(one.by_displacement.size(), Vec2::Zero());
+            for (std::size_t n = 0; n < one.by_number.size(); ++n) all.by_number[n] += one.by_number[n];
+            for (std::size_t f = 0; f < one.by_displacement.size(); ++f) all.by_displacement[f] += one.by_displacement[f];
+        }
+        return all;
+    };
+    const std::span<const MissedEnergy> all(found);
+    const MissedEnergy missed_here = sum(all.first(of_here));
+    return {missed_here, as_end.empty() ? missed_here : sum(all.subspan(of_here))};
 }
 
 LoadState Quasistatic::load_state(const Missed& missed) const {

@@ -173,7 +173,6 @@ class Quasistatic {
     std::vector<std::optional<TipBoxes>> boxes_ahead() const;
     int start_of_advance(int end) const;
     Missed missed_at(std::size_t number, bool with_slopes);
-    MissedEnergy missed_in(const std::vector<std::optional<TipBoxes>>& boxes, bool with_slopes);
     LoadState load_state(const Missed& missed) const;
     bool parted(std::size_t number) const;
     LoadState nothing(double time) const;

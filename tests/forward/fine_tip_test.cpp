@@ -20,7 +20,7 @@ MissedEnergy missed_by(const AtRest& run, const std::vector<MaterialSlope>& numb
     FineTip fine_tip(run.scene, run.plan, run.materials, run.body, numbers);
     if (!from) from = run.equilibrium.cracks().lines[0].end.position;
     const auto boxes = fine_tip.about(run.equilibrium.cracks(), {0, *from, *from + Vec2(way, 0.0)});
-    return boxes ? fine_tip.missed(*boxes, run.equilibrium, 0, true, !numbers.empty()) : MissedEnergy{};
+    return boxes ? fine_tip.missed({{*boxes, 0, true}}, run.equilibrium, !numbers.empty())[0] : MissedEnergy{};
 }
 
 // What the crack of a scene releases when it goes on by a way, by the grid alone and with what the boxes tell [J].
@@ -178,15 +178,15 @@ TEST(UnitFineTip, BoxesThatTakeACrackAlongAreAsMadeAnew) {
     for (const Vec2& tip : {Vec2(1.85e-3, 2e-3), Vec2(1.9e-3, 2.005e-3), Vec2(1.95e-3, 2.005e-3), Vec2(2.05e-3, 2.0e-3)}) {
         run.equilibrium.grow(0, true, tip);
         ASSERT_EQ(run.equilibrium.solve(1.0), Equilibrium::Outcome::solved);
-        const MissedEnergy one = kept.missed(*boxes, run.equilibrium, 0, true, true);
+        const MissedEnergy one = kept.missed({{*boxes, 0, true}}, run.equilibrium, true)[0];
         FineTip anew(run.scene, run.plan, run.materials, run.body, numbers);
-        const MissedEnergy other = anew.missed(*boxes, run.equilibrium, 0, true, true);
+        const MissedEnergy other = anew.missed({{*boxes, 0, true}}, run.equilibrium, true)[0];
         ASSERT_NE(other.energy, 0.0);
         // Of a crack that turns, ties know where it was going when it came: made anew, where it goes.
         EXPECT_NEAR(one.energy, other.energy, 1e-3 * std::abs(other.energy));
         EXPECT_NEAR(one.by_number[0], other.by_number[0], 1e-3 * std::abs(other.by_number[0]));
         // Asked for again, nothing changes.
-        EXPECT_NEAR(kept.missed(*boxes, run.equilibrium, 0, true, false).energy, one.energy, 1e-9 * std::abs(one.energy));
+        EXPECT_NEAR(kept.missed({{*boxes, 0, true}}, run.equilibrium, false)[0].energy, one.energy, 1e-9 * std::abs(one.energy));
     }
 }
 
