@@ -40,6 +40,11 @@ Vec2 steepest(const std::vector<Eigen::Matrix3d>& value, int side) {
     return first_axis(tensor);
 }
 
+// Places in different parts differ by rounding: by less than this power of two, of half a rectangle.
+constexpr int same_place = -36;
+
+Vec2 rounded(const Vec2& x, double unit) { return unit * (x / unit).array().round().matrix(); }
+
 // A rectangle, and for an unevenness the spread of its places.
 using Rectangle = std::array<std::int64_t, 6>;
 
@@ -377,10 +382,19 @@ LocalWood MaterialMap::average(const Vec2& centre, const Vec2& half) const {
 
 LocalWood MaterialMap::average(WoodArea& area) const {
     if (homogeneous_) return pure_[0];
-    const Vec2 x = area.centre + corner_;
-    if (const LocalWood* wood = band_around(x, area.half)) return *wood;
+    if (const LocalWood* wood = band_around(area.centre + corner_, area.half)) return *wood;
     if (!is_part_) return find_average(area);
-    return known_->of(known_->average, rectangle(x, area.half, Vec2::Zero()), [&] { return find_average(area); });
+    WoodArea shared = in_specimen(area);
+    const LocalWood found =
+        known_->of(known_->average, rectangle(shared.centre, shared.half, Vec2::Zero()), [&] { return find_average(shared); });
+    area.samples = std::move(shared.samples);
+    return found;
+}
+
+// An area of a part, which gives its samples away, with its place in the specimen: to the same bits for all parts.
+WoodArea MaterialMap::in_specimen(WoodArea& area) const {
+    const double unit = std::ldexp(1.0, std::ilogb(area.half.minCoeff()) + same_place);
+    return {rounded(area.centre + corner_, unit), rounded(area.half, unit), std::move(area.samples)};
 }
 
 // How many samples an area has a side.
@@ -390,7 +404,7 @@ int MaterialMap::sample(WoodArea& area) const {
     area.samples.reserve(side * side);
     for (int k = 0; k < side * side; ++k) {
         const Vec2 place((2.0 * (k % side) + 1.0) / side - 1.0, (2.0 * (k / side) + 1.0) / side - 1.0);
-        area.samples.push_back(sample_at(area.centre + corner_ + place.cwiseProduct(area.half)));
+        area.samples.push_back(sample_at(area.centre + place.cwiseProduct(area.half)));
     }
     return side;
 }
@@ -418,7 +432,7 @@ LocalWood MaterialMap::find_average(WoodArea& area) const {
     const double share = 1.0 / sum.filled;  // means over what is there; the void only thins the point
     sum.elasticity.coefficients *= share;
     sum.mixed = least < most;
-    const std::optional<Vec2> normal = sum.mixed ? std::optional(layer_normal(area.centre + corner_, area.half)) : std::nullopt;
+    const std::optional<Vec2> normal = sum.mixed ? std::optional(layer_normal(area.centre, area.half)) : std::nullopt;
     if (orthotropic_) average_elasticity(elasticities, samples, normal, sum.elasticity);
     else if (normal) sum.elasticity.normal = *normal;
     sum.density *= share;
@@ -432,8 +446,12 @@ LocalWood MaterialMap::find_average(WoodArea& area) const {
 Unevenness MaterialMap::unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {
     if (!average.mixed || average.filled < 1.0) return {};
     if (!is_part_) return find_unevenness(area, average, spread);
-    return known_->of(known_->unevenness, rectangle(area.centre + corner_, area.half, spread),
-                      [&] { return find_unevenness(area, average, spread); });
+    WoodArea shared = in_specimen(area);
+    const Vec2 exact = rounded(spread, std::ldexp(1.0, same_place));
+    const Unevenness found = known_->of(known_->unevenness, rectangle(shared.centre, shared.half, exact),
+                                        [&] { return find_unevenness(shared, average, exact); });
+    area.samples = std::move(shared.samples);
+    return found;
 }
 
 Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const {

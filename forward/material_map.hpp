@@ -54,7 +54,8 @@ class MaterialMap {
     explicit MaterialMap(const Scene& scene);
 
     /// The same wood as a part of the specimen sees it that has its lower left corner there. What rectangles hold on average is
-    /// found once for all such parts, places counting to a thousandth of the rectangle; parts are for one thread at a time.
+    /// found once for all such parts, whichever comes first, places counting to a thousandth of the rectangle; several threads
+    /// may ask.
     MaterialMap part(const Vec2& corner) const;
 
     /// At a place. Outside a picture the nearest pixel counts, so that rounding at the edge costs no points.
@@ -92,6 +93,7 @@ class MaterialMap {
     class Transition;
     WoodArea::Sample sample_at(const Vec2& x) const;
     LocalWood wood_of(const WoodArea::Sample& sample) const;
+    WoodArea in_specimen(WoodArea& area) const;
     int sample(WoodArea& area) const;
     LocalWood find_average(WoodArea& area) const;
     Unevenness find_unevenness(WoodArea& area, const LocalWood& average, const Vec2& spread) const;
