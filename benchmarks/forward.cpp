@@ -5,6 +5,8 @@
 
 #include <benchmark/benchmark.h>
 
+#include <malloc.h>
+
 #include <fstream>
 #include <string>
 
@@ -74,6 +76,7 @@ void elastic_block(benchmark::State& state, ShapeFunction shape, VelocityUpdate 
     scene.specimen.material = "EW";
     scene.solver.shape_function = shape;
     scene.solver.velocity_update = update;
+    malloc_trim(0);  // of benchmarks before
     wipe_mark();
     const double before = memory("VmRSS");
     const MaterialMap materials(scene);

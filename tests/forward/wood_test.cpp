@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
@@ -289,6 +290,38 @@ TEST(UnitWood, KnowsWhereInACellEachWoodLies) {
     const Unevenness whole = materials.unevenness(cell, average, {1.0, 1.0});
     EXPECT_LT((spread * whole.coupling - coupling).norm(), 1e-9 * coupling.norm());
     EXPECT_LT((spread * spread * whole.bending - bending).norm(), 1e-9 * bending.norm());
+}
+
+// Parts of a specimen share what their cells hold. Each counts places from its own corner, with its own rounding.
+TEST(UnitWood, PartsShareTheSameBitsWhicheverComesFirst) {
+    const Scene scene = ringed(0.44e-3);
+    const double cell = 1e-3 / 15.0;
+    std::array<std::vector<LocalWood>, 2> found;
+    std::array<std::vector<Unevenness>, 2> uneven;
+    int mixed = 0;
+    for (const bool other_first : {false, true}) {
+        const MaterialMap materials(scene);
+        for (int i = 5; i < 60; ++i)
+            for (int j = 5; j < 15; ++j)
+                for (const bool second : {false, true}) {
+                    const int corner = second == other_first ? 3 : 2;
+                    const MaterialMap part = materials.part(Vec2::Constant(corner * cell));
+                    WoodArea area{cell * Vec2(i + 0.5 - corner, j + 0.5 - corner), Vec2::Constant(0.5 * cell)};
+                    const LocalWood wood = part.average(area);
+                    const Unevenness unevenness = part.unevenness(area, wood, {0.9, 0.9});
+                    if (second) continue;
+                    found[other_first].push_back(wood);
+                    uneven[other_first].push_back(unevenness);
+                    mixed += wood.mixed;
+                }
+    }
+    ASSERT_GT(mixed, 10);
+    for (std::size_t k = 0; k < found[0].size(); ++k) {
+        EXPECT_EQ(found[0][k].elasticity.coefficients, found[1][k].elasticity.coefficients);
+        EXPECT_EQ(found[0][k].toughness, found[1][k].toughness);
+        EXPECT_EQ(uneven[0][k].coupling, uneven[1][k].coupling);
+        EXPECT_EQ(uneven[0][k].bending, uneven[1][k].bending);
+    }
 }
 
 // Whatever strain and bending e, q there are in a whole cell, its energy e . S e / 2 + e . G q + q . H q / 2 is positive: of the
