@@ -50,7 +50,8 @@ struct TipPlace {
 /// advance and after it, and takes no part in what the advance releases; in boxes that follow the tip it would.
 class FineTip {
   public:
-    /// All must outlive this. `numbers`: of the materials, by which slopes may be asked for.
+    /// All must outlive this. `numbers`: of the materials, by which slopes may be asked for. `side_by_side`: several places are
+    /// solved in a thread each, to the same bits.
     FineTip(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
             const std::vector<MaterialSlope>& numbers, bool side_by_side = false);
 
