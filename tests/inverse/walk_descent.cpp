@@ -80,6 +80,25 @@ TEST(UnitWalkDescent, FindsTheSamePointWhereRunsFail) {
     EXPECT_GT(alone, 0);
 }
 
+TEST(UnitWalkDescent, EndsEarlyWhereItsBestRunIsEnough) {
+    const Near near = [](const Eigen::VectorXd& point) -> Objective::Evaluate {
+        return [point](const Eigen::VectorXd& x, int) { return evaluation(residuals_near(point, x)); };
+    };
+    const Nearby nearby{near, near, {true, false}, false};
+    std::size_t runs[2];
+    for (const bool early : {false, true}) {
+        Objective objective(
+            2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 100, 1);
+        const Eigen::VectorXd start = Eigen::Vector2d(0.1, 0.9);
+        const double at_start = objective.at(start)->misfit;
+        const auto enough = [&](const Evaluation& best) { return early && best.misfit < at_start; };
+        EXPECT_TRUE(descend_again(objective, nearby, enough, 1));
+        EXPECT_LT(objective.best()->evaluation->misfit, at_start);
+        runs[early] = objective.runs().size();
+    }
+    EXPECT_LT(runs[true], runs[false]);
+}
+
 TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
     Objective objective(
         2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 2, 1);
