@@ -24,6 +24,7 @@ constexpr int points_a_parameter = 12;  // of a spread
 constexpr int most_profiles = 8;        // in windows of rising width
 constexpr double rounding = 1e-9;       // of the box
 constexpr double as_good = 0.02;        // of the misfit, in what the noise explains: a seventh of a standard error
+constexpr double as_seen = 1;           // the same, a standard error: so far away what a look tells still holds
 constexpr double as_promised = 0.5;     // of a rise of the misfit: as far as a run may be off it
 constexpr int most_descents = 4;        // from lower points that looks come upon
 
@@ -227,6 +228,10 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
     return Profiled::taken;
 }
 
+bool is_lower(const Run& one, const Run& other, const Uncertainty& about, double by) {
+    return one.evaluation->misfit < other.evaluation->misfit - by * about.temperature;
+}
+
 }  // namespace
 
 // The window's edges, as a covariance, in the triangular form that begins with the parameter (Cholesky).
@@ -308,9 +313,7 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
     return found;
 }
 
-bool is_lower(const Run& one, const Run& other, const Uncertainty& about) {
-    return one.evaluation->misfit < other.evaluation->misfit - as_good * about.temperature;
-}
+bool is_lower(const Run& one, const Run& other, const Uncertainty& about) { return is_lower(one, other, about, as_good); }
 
 std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,
                                           const std::function<void()>& descend) {
@@ -318,7 +321,8 @@ std::optional<CloseLook> look_and_descend(Objective& objective, const std::funct
     for (int i = 0; i < most_descents && close && is_lower(close->uncertainty.best, *objective.best(), close->uncertainty); ++i) {
         const Run before = *objective.best();
         objective.at(close->uncertainty.best.x);
-        if (!is_lower(*objective.best(), before, close->uncertainty)) {
+        if (!is_lower(*objective.best(), before, close->uncertainty) ||
+            !is_lower(close->uncertainty.best, before, close->uncertainty, as_seen)) {
             break;
         }
         descend();

@@ -50,9 +50,10 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
 /// Whether a run is lower than another by more than what is as good as the same, with what is said `about` the place.
 bool is_lower(const Run& one, const Run& other, const Uncertainty& about);
 
-/// `look`s about the best run. Where runs nearby promise a lower point and a run there confirms it, the objective `descend`s from
-/// there and has another look, some times at most. What they promise and no run confirms counts as an error: covariance and
-/// intervals, which are those about the promised point, take in the way to the best run.
+/// `look`s about the best run. Where runs nearby promise a lower point and a run there confirms it, that is the best one; if it
+/// is more than a standard error away, the objective `descend`s from there and has another look, some times at most. What they
+/// promise and no run confirms counts as an error: covariance and intervals, which are those about the promised point, take in
+/// the way to the best run.
 std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,
                                           const std::function<void()>& descend);
 

@@ -202,7 +202,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
             names.push_back(parameter.name);
         }
         std::optional<CloseLook> close;  // where runs near the best one are cheap, as the simulation has derivatives
-        std::future<Evaluation> wide;    // there, the best values on cells twice as wide
+        std::future<Evaluation> wide;    // there, on cells twice as wide, what the look is about
+        Run looked_at;
         const auto estimate = [&] {
             if (!runs.has_walks()) {
                 return estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));
@@ -211,7 +212,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 if (wide.valid()) {  // of what was the best point before: the same runs for any number of threads
                     wide.wait();
                 }
-                const Eigen::VectorXd x = objective.best()->x;
+                looked_at = *objective.best();
+                const Eigen::VectorXd x = looked_at.x;
                 runs.walks().catch_up(runs.values_at(x));
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
                 const std::vector<bool> exact = runs.walks().exact_near();
@@ -256,7 +258,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         if (close) {
             const Evaluation there = wide.get();
             if (there.usable() && uncertainty.slope.size() > 0) {
-                take_in_grid(fit, box, best.x, left_by_grid(study, model, best, there, uncertainty));
+                take_in_grid(fit, box, best.x, left_by_grid(study, model, looked_at, there, uncertainty));
             } else {
                 take_in_untold_grid(fit, box, best.x,
                                     there.usable() ? "no slopes at the best point" : "cells twice as wide: " + there.status);

@@ -20,8 +20,10 @@ constexpr double first_radius = 0.2;
 constexpr double reach_where_exact = 5.0;  // radii
 constexpr double last_radius = 0.03;
 constexpr double least_radius = 1e-4;
-constexpr double least_gain = 3e-3;     // of the misfit: with a misfit of tens, far less than one standard error
-constexpr double least_rise = 0.05;     // of the misfit, where noise is in it: a quarter of a standard error
+constexpr double least_gain = 3e-3;     // of the misfit, where no noise is in it
+constexpr double least_rise = 0.05;     // in what noise leaves of a residual, squared: a fifth of a standard error
+constexpr double last_rise = 1;         // the same: of a last step, of one standard error, which leaves far less than that
+constexpr double all_noise = 0.25;      // of the misfit for each residual: with less there may be no noise to hide that step in
 constexpr double free_of_noise = 0.01;  // of the misfit for each residual: below that it is rounding of data or model
 constexpr int most_unconfirmed = 2;  // steps within the last radius whose gain no run confirms: what is left is the model's noise
 
@@ -123,9 +125,9 @@ Lowest lowest_near(const Eigen::VectorXd& point, const Nearby& nearby, bool roug
     return nearby.recall ? nearby.recall(point, window, rough, search) : search();
 }
 
-bool is_worth_a_run(const Evaluation& here, double gain) {
-    const bool noisy = here.misfit - gain > free_of_noise * static_cast<double>(here.residuals.size());
-    return gain > std::max(least_gain * here.misfit, noisy ? least_rise : 0.0);
+bool is_worth_a_run(const Evaluation& here, double gain, double rise = least_rise) {
+    const double left = (here.misfit - gain) / static_cast<double>(here.residuals.size());
+    return gain > (left > free_of_noise ? rise * std::max(1.0, left) : least_gain * here.misfit);
 }
 
 struct Descent {
@@ -161,6 +163,11 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
         }
         const auto there = objective.at(trial.x);
         const double gain = misfit - objective.best()->evaluation->misfit;
+        const bool is_last = !is_worth_a_run(*here.evaluation, expected, last_rise) &&
+                             misfit - expected > all_noise * static_cast<double>(here.evaluation->residuals.size());
+        if (is_last) {
+            return {!objective.stopped(), is_worth_a_run(*here.evaluation, gain) ? 0.0 : expected - gain};
+        }
         const Eigen::VectorXd away = (trial.x - here.x).cwiseAbs();
         const double step = away.cwiseQuotient(reach).maxCoeff();
         if (is_worth_a_run(*here.evaluation, gain)) {
