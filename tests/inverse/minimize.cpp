@@ -428,6 +428,33 @@ TEST(UnitCloseLook, GoesDownToALowerValleyThatItComesUpon) {
     EXPECT_NEAR(found->uncertainty.upper_95[0], 0.5 + found->uncertainty.quantile * 0.02, 0.002);
 }
 
+// Less than a standard error away, a point that a run confirms is taken as the look has it.
+TEST(UnitCloseLook, TakesALowerPointNearByWithoutAnotherLook) {
+    const auto bowl = [](const VectorXd& x, int) {
+        Evaluation evaluation = two_valleys(x);
+        evaluation.residuals.head(3) << (x - Vector2d(0.5, 0.5)) / 0.02, 1.0;
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    const Vector2d start(0.515, 0.5);
+    Objective objective(2, bowl, 100, 1);
+    objective.at(start);
+    int looks = 0;
+    const auto found = look_and_descend(
+        objective,
+        [&] {
+            ++looks;
+            return look_close(objective, {bowl, true, 1}, start, {{30}}, {"a", "b"}, 1);
+        },
+        [] { FAIL() << "it is near by"; });
+    ASSERT_TRUE(found);
+    EXPECT_EQ(looks, 1);
+    EXPECT_EQ(objective.runs().size(), 2u);
+    EXPECT_EQ(objective.best()->x, found->uncertainty.best.x);
+    EXPECT_NEAR((objective.best()->x - Vector2d(0.5, 0.5)).norm(), 0.0, 0.004);  // a fifth of a standard error
+    EXPECT_NEAR(found->uncertainty.lower_95[0], 0.5 - found->uncertainty.quantile * 0.02, 0.005);
+}
+
 // The cheap model has its lowest point elsewhere, which no run confirms: the intervals hold both.
 TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
     const auto bowl = [](const Vector2d& bottom) {

@@ -99,6 +99,33 @@ TEST(UnitWalkDescent, EndsEarlyWhereItsBestRunIsEnough) {
     EXPECT_LT(runs[true], runs[false]);
 }
 
+// A standard error and less from the lowest point, in noise of one sigma a residual, one run is the last: none is looked about
+// but the first.
+TEST(UnitWalkDescent, EndsWithAStepOfAStandardError) {
+    const auto with_noise = [](const Eigen::VectorXd& r) {
+        Eigen::VectorXd all = Eigen::VectorXd::Ones(40);
+        all.head(3) = r;
+        return evaluation(all);
+    };
+    Eigen::VectorXd start = Eigen::Vector2d(0.0, 0.31);
+    const Near near = [&](const Eigen::VectorXd& point) -> Objective::Evaluate {
+        EXPECT_EQ(point, start);
+        return [&, point](const Eigen::VectorXd& x, int) { return with_noise(residuals_near(point, x)); };
+    };
+    for (const auto& [x, runs] : {std::pair{0.72, 2u}, {0.701, 1u}}) {  // a gain of 0.09, of 0.02
+        Objective objective(
+            2, [&](const Eigen::VectorXd& at, int) { return with_noise(residuals(at)); }, 100, 1);
+        start[0] = x;
+        const double before = with_noise(residuals(start)).misfit;
+        const SearchResult found =
+            descend_by_walks(objective, {near, near, {true, false}, false}, 1, never, start, 1, [](const std::string&) {});
+        std::printf("gain from %.6f to %.6f in %zu runs\n", before, objective.best()->evaluation->misfit,
+                    objective.runs().size());
+        EXPECT_TRUE(found.converged);
+        EXPECT_EQ(objective.runs().size(), runs);
+    }
+}
+
 TEST(UnitWalkDescent, StopsWhenRunsAreUsedUp) {
     Objective objective(
         2, [](const Eigen::VectorXd& x, int) { return evaluation(residuals(x)); }, 2, 1);
