@@ -16,12 +16,29 @@ constexpr double last_radius = difference_step;
 constexpr double least_step = 0.02 * difference_step;
 constexpr double least_gain = 2e-4;  // of the misfit: of hundreds, a small part of what moves a parameter by one standard error
 constexpr int most_stalls = 2;       // steps at the last radius that gain nothing
+constexpr int most_tries = 3;        // of a run beside a point
+
+// Runs the differences about x, each one that fails nearer by a little, some times at most: a side that no run has seen may be
+// where the misfit is lower.
+void run_about(Objective& objective, const Eigen::VectorXd& x, double radius) {
+    std::vector<Eigen::VectorXd> points = stencil(x, radius);
+    for (int i = 0; i < most_tries && !points.empty(); ++i) {
+        const auto runs = objective.at(points);
+        std::vector<Eigen::VectorXd> nearer;
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            if (runs[k] && !runs[k]->usable()) {
+                nearer.push_back(x + 0.8 * (points[k] - x));
+            }
+        }
+        points = std::move(nearer);
+    }
+}
 
 // A model of the runs about x; where they do not span all directions, after running the differences about it.
 std::optional<LocalModel> model_about(Objective& objective, const Eigen::VectorXd& x, double radius) {
     auto model = LocalModel::fit(objective.runs(), x, 1.5 * radius);
     if (!model) {
-        objective.at(stencil(x, radius));
+        run_about(objective, x, radius);
         model = LocalModel::fit(objective.runs(), x, 1.5 * radius);
     }
     return model;
@@ -30,13 +47,23 @@ std::optional<LocalModel> model_about(Objective& objective, const Eigen::VectorX
 // Runs what has not been run of the differences about x; whether there were any.
 bool refresh(Objective& objective, const Eigen::VectorXd& x, double radius) {
     const std::size_t before = objective.runs().size();
-    objective.at(stencil(x, radius));
+    run_about(objective, x, radius);
     return objective.runs().size() > before;
 }
 
-// Looks round farther away before an end is believed: a model's noise makes hollows about as wide as its last steps.
+// Looks round farther away before an end is believed: a model's noise makes hollows about as wide as its last steps. And to where
+// the differences alone say: runs that steps have left close by tell more of the noise.
 bool in_a_hollow(Objective& objective, const Run& best) {
-    objective.at(stencil(best.x, first_radius));
+    run_about(objective, best.x, first_radius);
+    std::vector<Run> apart{best};
+    for (const Run& run : objective.runs()) {
+        if ((run.x - best.x).cwiseAbs().maxCoeff() > 0.3 * last_radius) {
+            apart.push_back(run);
+        }
+    }
+    if (const auto model = LocalModel::fit(apart, best.x, 1.5 * last_radius)) {
+        objective.at(lowest_point(*model, best.x, last_radius));
+    }
     return objective.best()->evaluation->misfit < (1 - least_gain) * best.evaluation->misfit;
 }
 

@@ -16,6 +16,7 @@ namespace crampfit {
 namespace {
 
 constexpr int most_failed_starts = 20;
+constexpr double least_gain = 1e-3;  // of the misfit, for which a simplex sets out once more
 
 using Stage = std::function<void(const std::string&)>;
 
@@ -37,23 +38,26 @@ void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, uns
     }
 }
 
-// Methods that lead a polynomial through the misfits of single runs take what stands for a failed one for the misfit there.
+// Local methods of NLopt take what stands for a failed run for the misfit there: a polynomial through it leads astray, and a
+// simplex may shrink before its time.
 bool is_misled(const Objective& objective, const Method& method) {
-    return (method.name == "bobyqa" || method.name == "cobyla") &&
+    return method.name != "auto" && method.name != "ceres" && !is_global(method) &&
            std::any_of(objective.runs().begin(), objective.runs().end(),
                        [](const Run& run) { return !run.evaluation->usable(); });
 }
 
 // Where failed runs end a method before its time or mislead it, a simplex method that only compares misfits goes on from the best
-// point.
+// point, as long as it finds lower ones.
 Solution descend(Objective& objective, const Eigen::VectorXd& start, const Method& method) {
     Solution solution = minimize(objective, start, method);
-    const bool misled = is_misled(objective, method);
-    if ((!solution.converged || misled) && !objective.exhausted() && objective.best()) {
-        const std::string why = solution.converged ? "runs failed" : solution.message;
-        const Eigen::VectorXd best = objective.best()->x;
-        solution = minimize(objective, best, {"sbplx", method.seed});
+    bool goes_on = !solution.converged || is_misled(objective, method);
+    const std::string why = solution.converged ? "runs failed" : solution.message;
+    while (goes_on && !objective.exhausted() && objective.best()) {
+        const Run best = *objective.best();
+        solution = minimize(objective, best.x, {"sbplx", method.seed});
         solution.message = fmt::format("{} gave up ({}); sbplx went on", method.name, why);
+        goes_on =
+            is_misled(objective, {"sbplx"}) && objective.best()->evaluation->misfit < (1 - least_gain) * best.evaluation->misfit;
     }
     return solution;
 }
