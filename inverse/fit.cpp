@@ -203,7 +203,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         }
         std::optional<CloseLook> close;  // where runs near the best one are cheap, as the simulation has derivatives
         std::future<Evaluation> wide;    // there, on cells twice as wide, what the look is about
-        Run looked_at;
+        Run looked_at;                   // that
         const auto estimate = [&] {
             if (!runs.has_walks()) {
                 return estimate_uncertainty(objective, model.curves(), names, difference_step, Window(box.size()));

@@ -55,7 +55,7 @@ Solution descend(Objective& objective, const Eigen::VectorXd& start, const Metho
     while (goes_on && !objective.exhausted() && objective.best()) {
         const Run best = *objective.best();
         solution = minimize(objective, best.x, {"sbplx", method.seed});
-        solution.message = fmt::format("{} gave up ({}); sbplx went on", method.name, why);
+        solution.message = fmt::format("{} may have ended too soon ({}); sbplx went on", method.name, why);
         goes_on =
             is_misled(objective, {"sbplx"}) && objective.best()->evaluation->misfit < (1 - least_gain) * best.evaluation->misfit;
     }

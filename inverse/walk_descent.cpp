@@ -163,7 +163,8 @@ Descent descend_from(Objective& objective, const Nearby& nearby, const Eigen::Ve
         }
         const auto there = objective.at(trial.x);
         const double gain = misfit - objective.best()->evaluation->misfit;
-        const bool is_last = !is_worth_a_run(*here.evaluation, expected, last_rise) &&
+        // In a window that failed steps have made small little is promised wherever it lies.
+        const bool is_last = radius >= last_radius && !is_worth_a_run(*here.evaluation, expected, last_rise) &&
                              misfit - expected > all_noise * static_cast<double>(here.evaluation->residuals.size());
         if (is_last) {
             return {!objective.stopped(), is_worth_a_run(*here.evaluation, gain) ? 0.0 : expected - gain};
