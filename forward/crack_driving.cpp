@@ -90,6 +90,10 @@ LoadState between(const LoadState& from, const LoadState& to, double time) {
     LoadState found = weighted({&from, &to}, {1.0 - s, s});
     found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
     found.end_potential = cubic(from.end_potential, span * from.end_power, to.end_potential, span * to.end_power, s);
+    for (std::size_t k = 0; k < found.tips.size(); ++k) {  // G as K^2
+        const double root = std::lerp(std::sqrt(std::max(0.0, from.tips[k].G)), std::sqrt(std::max(0.0, to.tips[k].G)), s);
+        found.tips[k].G = root * root;
+    }
     return found;
 }
 

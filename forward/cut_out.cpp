@@ -8,6 +8,8 @@ namespace crampfit {
 
 namespace {
 
+constexpr double a_little = 1e-6;  // of the displacements: closes nothing, and leaves ten digits of a difference
+
 // What is cut out, its wood a part of the specimen's.
 Scene scene_in(const Scene& whole, const Box& box) {
     Scene scene = whole;
@@ -209,8 +211,21 @@ std::vector<Vec2> CutOut::slope_by(const GridView& from, const std::vector<Vec2>
     if (!solved_there_ && !inner.empty()) {
         const Equilibrium::Motion yielding = equilibrium_->yield_to(inner);
         for (std::size_t n = 0; n < numbers.size(); ++n) by_number[n] -= sign * slopes.along(yielding, static_cast<int>(n));
-        equilibrium_->set_displacements(yielding.fields, 0.0);
-        for (std::size_t f = 0; f < pull.size(); ++f) pull[f] += inner[f] + equilibrium_->out_of_balance_forces()[f];
+        // What the yielding puts on the outline, by a little of it: all of it could close faces that stand open.
+        const std::vector<Vec2> here = equilibrium_->displacements(), held_by = equilibrium_->out_of_balance_forces();
+        const auto largest = [](const std::vector<Vec2>& of) {
+            double most = 0.0;
+            for (const Vec2& v : of) most = std::max(most, v.lpNorm<Eigen::Infinity>());
+            return most;
+        };
+        const double way = largest(yielding.fields);
+        const double little = way > 0.0 && largest(here) > 0.0 ? a_little * largest(here) / way : 1.0;
+        std::vector<Vec2> beside = here;
+        for (std::size_t f = 0; f < beside.size(); ++f) beside[f] += little * yielding.fields[f];
+        equilibrium_->set_displacements(beside, 0.0);
+        for (std::size_t f = 0; f < pull.size(); ++f)
+            pull[f] += inner[f] + (equilibrium_->out_of_balance_forces()[f] - held_by[f]) / little;
+        equilibrium_->set_displacements(here, 0.0);
     }
     std::vector<Vec2> slope(from.displacement.size(), Vec2::Zero());
     for (const Hold& hold : taken_)

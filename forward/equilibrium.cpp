@@ -649,10 +649,24 @@ bool Equilibrium::relax(const std::vector<Vec2>& displacement) {
     prescribed_step_.assign(equation_.size(), 0.0);
     still_to_go_.assign(boundary_.drivers(), Vec2::Zero());
     find_forces();
-    if (!factor_tangent(false)) return false;
-    move(tangent_step(out_of_balance()), 1.0);
-    find_forces();
-    return true;
+    // All is linear but which faces touch.
+    std::vector<char> closed(cracks_.pairs.size());
+    const auto look_at_faces = [&] {
+        bool same = true;
+        for (std::size_t k = 0; k < closed.size(); ++k) {
+            const char now = is_closed(cracks_.pairs[k]);
+            same = std::exchange(closed[k], now) == now && same;
+        }
+        return same;
+    };
+    look_at_faces();
+    for (int k = 0; k < most_iterations; ++k) {
+        if (!factor_tangent(false)) return false;
+        move(tangent_step(out_of_balance()), 1.0);
+        find_forces();
+        if (look_at_faces()) return true;
+    }
+    return false;
 }
 
 }  // namespace crampfit

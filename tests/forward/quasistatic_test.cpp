@@ -580,6 +580,14 @@ TEST(VerificationWalk, FiniteRotationComesToTheSameAtSmallLoad) {
     std::printf("critical displacement at a strain of %.1e: with finite rotation off by %+.1e\n", a / 8e-3, b / a - 1);
     EXPECT_NEAR(b, a, 1e-3 * a);
     EXPECT_NEAR(displacement_at_length(turning, 6e-3), displacement_at_length(linear, 6e-3), 1e-3 * a);
+    // Rows between the steps of the loading, from the first on.
+    int rows = 0;
+    for (; linear.series[rows + 1].displacement < std::min(a, b); ++rows) {
+        const Instant &one = linear.series[rows + 1], &other = turning.series[rows + 1];
+        ASSERT_NEAR(one.displacement, other.displacement, 1e-12);
+        EXPECT_NEAR(other.G, one.G, 5e-3 * one.G) << rows;
+    }
+    EXPECT_GT(rows, 100);
 }
 
 TEST(VerificationWalk, SmallStrainSaysHowMuchTurnsWouldChange) {
