@@ -427,7 +427,7 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         left[b].setZero(box.border, x.cols());
         for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
             const Box& half = boxes_[box.half[h]];
-            const Eigen::MatrixXd& from = left[box.half[h]];
+            const Eigen::MatrixXd from = std::exchange(left[box.half[h]], {});
             for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
                 const int row = half.offset[half.eliminated + k] - half.inner;
                 const int to = box.offset[box.slot[h][k]];
@@ -446,7 +446,7 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
         auto own = x.middleRows(first_[box.nodes[0]], box.inner);
-        Eigen::MatrixXd& at_border = left[b];
+        Eigen::MatrixXd at_border(box.border, x.cols());
         int row = 0;
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
             for (int e = 0; e < count_[box.nodes[k]]; ++e) at_border.row(row++) = x.row(first_[box.nodes[k]] + e);

@@ -89,10 +89,11 @@ double usual_step(const Curve& rows) {
 }
 
 // How the crack grew from row to row: steadily, so that the line between two rows says when it came up to a length, or by a
-// jump, which was anywhere between them.
+// jump, which was anywhere between them. Where both stand at one place, few rows time it no better than an average over `window`
+// would: by the part of it in which that goes through the noise.
 class GrowthByRows {
   public:
-    GrowthByRows(const Curve& rows, double noise) : rows_(rows) {
+    GrowthByRows(const Curve& rows, double noise, double window) : rows_(rows) {
         std::vector<double> grown{0.0};  // from row to row, none beyond the ends
         for (std::size_t i = 0; i + 1 < rows.y().size(); ++i) {
             grown.push_back(rows.y()[i + 1] - rows.y()[i]);
@@ -103,7 +104,8 @@ class GrowthByRows {
             // What is beyond twice the growth of the rows before and after; growth begins and ends between rows as jumps do.
             const double common = std::max(0.0, std::min(grown[i - 1], grown[i + 1]));
             const double jumped = grown[i] > clear * noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
-            jump_error_.push_back(jumped * (rows.x()[i] - rows.x()[i - 1]));
+            const double least = jumped > 0 ? window * noise / grown[i] : 0.0;
+            jump_error_.push_back(jumped * std::max(rows.x()[i] - rows.x()[i - 1], least));
             if (jumped < 0.5 && grown[i] > 0) {
                 steady.push_back(grown[i]);
             }
@@ -122,7 +124,7 @@ class GrowthByRows {
     double error_near(double at, double window) const {
         double error = 0;
         for (std::size_t i = 0; i < jump_error_.size(); ++i) {
-            if (rows_.x()[i] < at + 0.5 * window && rows_.x()[i + 1] > at - 0.5 * window) {
+            if (rows_.x()[i] <= at + 0.5 * window && rows_.x()[i + 1] >= at - 0.5 * window) {
                 error = std::max(error, jump_error_[i]);
             }
         }
@@ -316,7 +318,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
     const bool sparse = smoothing_window * static_cast<double>(rows.x().size()) < rows_in_a_window;
     arrival_window_ = sparse ? 0.0 : smoothing_window * (to - from);
     // A crack that ends with a jump is no shorter from there on: all of the window sees the jump, in model and data alike.
-    const GrowthByRows growth_by_rows(rows, noise);
+    const GrowthByRows growth_by_rows(rows, noise, sparse ? smoothing_window * (to - from) : 0.0);
     arrival_end_ = growth_by_rows.ends_with_jump() ? to + arrival_window_ : to;
     const Curve crack = continued(rows.x(), rows.y(), arrival_end_).smoothed(arrival_window_);
     const double shortest = rows.mean(from, from + arrival_window_);

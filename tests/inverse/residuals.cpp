@@ -88,6 +88,31 @@ TEST(UnitResiduals, AJumpIsTimedToTheRowsAroundIt) {
     }
 }
 
+TEST(UnitResiduals, AJumpWithinOneDisplacementIsNoBetterTimedByFewRows) {
+    // As crampfit's own series have it: the row before the jump and the one behind it stand at the same displacement.
+    const auto arrivals = [](int rows) {
+        Experiment experiment = straight_experiment();
+        experiment.data = measure(straight(1e5, 0, 1e-3, rows), 0, 0, 1);
+        Curves& data = experiment.data;
+        const auto middle = static_cast<std::ptrdiff_t>(rows / 2);
+        for (std::vector<double>* column : {&data.time, &data.displacement, &data.force, &data.crack_length}) {
+            if (!column->empty()) column->insert(column->begin() + middle, (*column)[static_cast<std::size_t>(middle)]);
+        }
+        for (std::size_t i = 0; i < data.crack_length.size(); ++i) {
+            data.crack_length[i] = i <= static_cast<std::size_t>(middle) ? 2e-3 : 6e-3;
+        }
+        return of_kind(Comparison(experiment), "arrival");
+    };
+    const auto few = arrivals(41), many = arrivals(401);
+    ASSERT_GT(few.size(), 8u);
+    ASSERT_EQ(few.size(), many.size());
+    for (std::size_t i = 0; i < few.size(); ++i) {
+        EXPECT_NEAR(few[i].measured, 0.5e-3, 1e-8);
+        EXPECT_GE(few[i].sigma, many[i].sigma);
+        EXPECT_LT(few[i].sigma, std::sqrt(few.size()) * 0.02e-3);  // a window, for all together
+    }
+}
+
 TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
     // Arrivals of rows with noise, about those without: about as large as their sigma says, each on its own.
     constexpr int rows = 41, draws = 400;
