@@ -14,6 +14,7 @@ namespace crampfit {
 namespace {
 
 constexpr double all_ways = 1.0;       // of the box, to either side
+constexpr double ways_about = 0.1;     // between both: a way that is the true one may promise little from a twentieth away
 constexpr double ways_beside = 0.01;   // farther than from one jump of the misfit, as the grid sees ways, to the next
 constexpr double nothing_left = 1e-6;  // of what noise leaves
 
@@ -137,7 +138,7 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     found.converged = weigh_and_descend(found.converged, enough > 0);
     if (!nearby_.turning.empty() && objective_.best()) {
         const bool is_fine = widening_ == 1.0, goes_on = starts == 1;  // from a search on wide cells
-        for (const double reach : {all_ways, ways_beside}) {
+        for (const double reach : {all_ways, ways_about, ways_beside}) {
             if ((reach == all_ways ? !goes_on : is_fine) && is_left_over()) {
                 stage("other ways");
                 if (look_for_ways(objective_, nearby_, reach, options_.seed)) {
