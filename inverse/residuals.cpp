@@ -24,6 +24,7 @@ constexpr double rows_in_a_window = 2;  // of crack length, at least, where it i
 constexpr double line_averages = 1.5;
 // In standard deviations of what a curve goes from row to row by noise: a step beyond is a jump, hardly ever noise.
 constexpr double clear = 5.0;
+constexpr double one_place = 1e-3;  // of a window: rows nearer to each other
 
 bool measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
@@ -104,8 +105,9 @@ class GrowthByRows {
             // What is beyond twice the growth of the rows before and after; growth begins and ends between rows as jumps do.
             const double common = std::max(0.0, std::min(grown[i - 1], grown[i + 1]));
             const double jumped = grown[i] > clear * noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
-            const double least = jumped > 0 ? window * noise / grown[i] : 0.0;
-            jump_error_.push_back(jumped * std::max(rows.x()[i] - rows.x()[i - 1], least));
+            const double apart = rows.x()[i] - rows.x()[i - 1];
+            const bool at_one_place = apart <= one_place * window && grown[i] > 2 * noise;
+            jump_error_.push_back(at_one_place ? window * noise / grown[i] : jumped * apart);
             if (jumped < 0.5 && grown[i] > 0) {
                 steady.push_back(grown[i]);
             }
