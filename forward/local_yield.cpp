@@ -13,8 +13,7 @@ namespace crampfit {
 
 namespace {
 
-constexpr double margin = 6.0;          // of the box about the facets, in cells
-constexpr Eigen::Index at_a_time = 16;  // stations whose slopes are found in one product
+constexpr double margin = 6.0;  // of the box about the facets, in cells
 
 Plan of_box(Plan plan) {
     plan.rotates = plan.friction = plan.contact = plan.remembers = plan.free_bodies = plan.finer_at_wheels = false;
@@ -40,19 +39,12 @@ struct LocalYield::Solved {
     void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {
         const std::vector<MaterialSlope>& here = cut.slopes_by(numbers);
         const Eigen::MatrixXd states = equilibrium->yields_to(loads);
-        std::vector<Vec2> displacement(fields());
-        std::vector<Eigen::MatrixXd> pulls(here.size());  // K' U, some stations at a time
-        for (Eigen::Index first = 0; first < states.cols(); first += at_a_time) {
-            const Eigen::Index count = std::min(at_a_time, states.cols() - first);
-            for (Eigen::MatrixXd& pull : pulls) pull.resize(states.rows(), count);
-            for (Eigen::Index k = 0; k < count; ++k) {
-                for (int f = 0; f < fields(); ++f) displacement[f] = states.col(first + k).segment<2>(2 * f);
-                equilibrium->set_displacements(displacement, 0.0);
-                const Equilibrium::Slopes slopes = equilibrium->slopes(here);
-                for (std::size_t n = 0; n < here.size(); ++n) pulls[n].col(k) = slopes.fields.col(n);
-            }
-            for (std::size_t n = 0; n < here.size(); ++n)
-                by_number[n].middleCols(first, count).noalias() -= sign * states.transpose() * pulls[n];
+        for (Eigen::Index station = 0; station < states.cols(); ++station) {
+            std::vector<Vec2> displacement(fields());
+            for (int f = 0; f < fields(); ++f) displacement[f] = states.col(station).segment<2>(2 * f);
+            equilibrium->set_displacements(displacement, 0.0);
+            const Eigen::MatrixXd pull = states.transpose() * equilibrium->slopes(here).fields;
+            for (std::size_t n = 0; n < here.size(); ++n) by_number[n].col(station) -= sign * pull.col(n);
         }
     }
 

@@ -106,6 +106,7 @@ class GrowthByRows {
             const double common = std::max(0.0, std::min(grown[i - 1], grown[i + 1]));
             const double jumped = grown[i] > clear * noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
             const double apart = rows.x()[i] - rows.x()[i - 1];
+            // With less growth the line to the rows beside it tells.
             const bool at_one_place = apart <= one_place * window && grown[i] > 2 * noise;
             jump_error_.push_back(at_one_place ? window * noise / grown[i] : jumped * apart);
             if (jumped < 0.5 && grown[i] > 0) {
