@@ -35,7 +35,7 @@ class SlidingBody {
     /// From now on the wood yields by so much more than the grid, with springs as stiff for the finer cells that say so. Of
     /// circles alone.
     void let_yield(std::shared_ptr<LocalYield> yield);
-    LocalYield* yield() const { return yield_.get(); }  // null: it does not
+    const std::shared_ptr<LocalYield>& yield() const { return yield_; }  // null: it does not
     const Shape& shape() const { return shape_; }
 
     /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].

@@ -47,7 +47,8 @@ constexpr double least_kept = 1e-3;
 
 }  // namespace
 
-Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads)
+Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads,
+                         const Equilibrium* same)
     : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed_at_rest),
       boundary_(scene, body, cracks_, &materials), gauges_(scene),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
@@ -59,7 +60,8 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
     }
     do_side_by_side(side_by_side_, sliding_.size(), [&](std::size_t s) {
-        let_yield(sliding_[s], boundary_.travel(sliding_driver_[s], std::min(plan.end_time, plan.still_from)));
+        if (same) sliding_[s].let_yield(same->sliding_[s].yield());
+        else let_yield(sliding_[s], boundary_.travel(sliding_driver_[s], std::min(plan.end_time, plan.still_from)));
     });
     displacement_.assign(cracks_.fields(), Vec2::Zero());
     double stiffest = 0.0;

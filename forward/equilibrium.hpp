@@ -27,8 +27,10 @@ namespace crampfit {
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
   public:
-    /// Equations are solved by `threads` threads, with the same bits whatever their number.
-    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1);
+    /// Equations are solved by `threads` threads, with the same bits whatever their number. `same`: an equilibrium of the same
+    /// scene and wood on another such body, which knows already how the wood yields under wheels.
+    Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads = 1,
+                const Equilibrium* same = nullptr);
 
     enum class Outcome { solved, not_converged, mechanism };  // mechanism: something can move without resistance
 
@@ -75,7 +77,7 @@ class Equilibrium {
     Motion yield_to(const std::vector<Vec2>& load) const;
 
     /// The displacements that such loads would bring about, both [2 x fields, any number].
-    Eigen::MatrixXd yields_to(Eigen::MatrixXd loads) const;
+    Eigen::MatrixXd yields_to(const Eigen::MatrixXd& loads) const;
 
     /// What such loads do on each other's motion, loads^T yields_to(loads), at half its cost.
     Eigen::MatrixXd compliance(const Eigen::SparseMatrix<double>& loads) const;
@@ -125,6 +127,9 @@ class Equilibrium {
     Snapshot save() const;
     void restore(const Snapshot& snapshot);
     void set_displacements(const std::vector<Vec2>& displacement, double time, const Contacts& contacts = {});
+
+    /// Slopes will not be asked for where wheels are: gives back what finds those of how the wood yields.
+    void forget_yield_slopes();
 
     /// In a linear scene: what is held stays where `displacement` has it, all else follows. False where something is loose.
     bool relax(const std::vector<Vec2>& displacement);

@@ -261,6 +261,11 @@ void Equilibrium::let_yield(SlidingBody& rigid, const Vec2& travel) {
     rigid.let_yield(LocalYield::about(way, rigid, scene_, plan_, materials_, body_));
 }
 
+void Equilibrium::forget_yield_slopes() {
+    for (const SlidingBody& rigid : sliding_)
+        if (rigid.yield()) rigid.yield()->forget_slopes();
+}
+
 // What the yield of stations beyond the grid's takes off the springs' stiffness K: K P gives P^T K (LocalYield::pressed).
 void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vector<SlidingBody::Touch>& touches) {
     const LocalYield::Pressed pressed = rigid.yield()->pressed(touches);

@@ -52,15 +52,17 @@ std::vector<Equilibrium::Motion> Equilibrium::motions(const std::vector<std::vec
     return found;
 }
 
-Eigen::MatrixXd Equilibrium::yields_to(Eigen::MatrixXd loads) const {
+Eigen::MatrixXd Equilibrium::yields_to(const Eigen::MatrixXd& loads) const {
     Eigen::MatrixXd step(equations_, loads.cols());
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) step.row(equation_[dof]) = loads.row(dof);
+    Eigen::MatrixXd yields = Eigen::MatrixXd::Zero(loads.rows(), loads.cols());
+    for (Eigen::Index k = 0; k < loads.cols(); ++k)
+        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+            if (equation_[dof] >= 0) step(equation_[dof], k) = loads(dof, k);
     factor_.solve(step);
-    loads.setZero();
-    for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-        if (equation_[dof] >= 0) loads.row(dof) = step.row(equation_[dof]);
-    return loads;
+    for (Eigen::Index k = 0; k < loads.cols(); ++k)
+        for (std::size_t dof = 0; dof < equation_.size(); ++dof)
+            if (equation_[dof] >= 0) yields(dof, k) = step(equation_[dof], k);
+    return yields;
 }
 
 Eigen::MatrixXd Equilibrium::compliance(const Eigen::SparseMatrix<double>& loads) const {
@@ -127,7 +129,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
     }
     // So are bodies' springs.
     do_side_by_side(side_by_side_, sliding_.size(), [&](std::size_t s) {
-        if (LocalYield* yield = sliding_[s].yield()) yield->know_slopes(numbers);
+        if (sliding_[s].yield()) sliding_[s].yield()->know_slopes(numbers);
     });
     for (std::size_t s = 0; s < sliding_.size(); ++s) {
         const std::vector<SlidingBody::Touch> touches = sliding_[s].touches(place_of(sliding_driver_[s]), displacement_);
@@ -142,7 +144,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
                 slope.potential[n] += stiffer * touches[k].energy;
                 forces[k] = stiffer * touches[k].force;
             }
-            if (LocalYield* yield = sliding_[s].yield()) {
+            if (const auto& yield = sliding_[s].yield()) {
                 LocalYield::Slope more = yield->slope(touches, std::move(forces), numbers, n);
                 slope.potential[n] += more.energy;
                 forces = std::move(more.forces);

@@ -361,6 +361,18 @@ void GridFactor::backward_columns(const Eigen::MatrixXd& factor, double* y, int 
     }
 }
 
+// From L^-1 times right sides.
+template <class Sides>
+void GridFactor::take_off_wide(Sides&& forward) const {
+    if (wide_.empty()) return;
+    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), forward.cols());
+    for (const Part& part : wide_)
+        seen(part.sides, Eigen::all) += part.rows.transpose() * forward.middleRows(part.first, part.rows.rows());
+    const Eigen::MatrixXd change = wide_change_ * seen;
+    for (const Part& part : wide_)
+        forward.middleRows(part.first, part.rows.rows()).noalias() -= part.rows * change(part.sides, Eigen::all);
+}
+
 void GridFactor::solve_few(Eigen::Ref<Eigen::MatrixXd> right) const {
     const int sides = static_cast<int>(right.cols());
     std::vector<std::size_t> at(boxes_.size() + 1, 0);
@@ -418,8 +430,9 @@ void GridFactor::solve_few(Eigen::Ref<Eigen::MatrixXd> right) const {
     });
 }
 
-void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
-    std::vector<Eigen::MatrixXd> left(boxes_.size());  // what each box leaves for the one that it is a half of
+// Of each unknown the right sides lie together: boxes hand on rows.
+void GridFactor::solve_many(Rows& x) const {
+    std::vector<Rows> left(boxes_.size());  // what each box leaves for the one that it is a half of
     const int top = static_cast<int>(boxes_.size()) - 1;
     upward(top, forks_, [&](int b) {
         const Box& box = boxes_[b];
@@ -427,7 +440,7 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         left[b].setZero(box.border, x.cols());
         for (int h = 0; h < 2 && box.half[0] >= 0; ++h) {
             const Box& half = boxes_[box.half[h]];
-            const Eigen::MatrixXd from = std::exchange(left[box.half[h]], {});
+            const Rows from = std::exchange(left[box.half[h]], {});
             for (std::size_t k = 0; k < box.slot[h].size(); ++k) {
                 const int row = half.offset[half.eliminated + k] - half.inner;
                 const int to = box.offset[box.slot[h][k]];
@@ -446,7 +459,7 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
         const Box& box = boxes_[b];
         if (box.inner == 0) return;
         auto own = x.middleRows(first_[box.nodes[0]], box.inner);
-        Eigen::MatrixXd at_border(box.border, x.cols());
+        Rows at_border(box.border, x.cols());
         int row = 0;
         for (std::size_t k = box.eliminated; k < box.nodes.size(); ++k)
             for (int e = 0; e < count_[box.nodes[k]]; ++e) at_border.row(row++) = x.row(first_[box.nodes[k]] + e);
@@ -457,8 +470,15 @@ void GridFactor::solve_columns(Eigen::Ref<Eigen::MatrixXd> x) const {
 
 void GridFactor::solve(Eigen::MatrixXd& right) const {
     if (right.size() == 0) return;
-    if (right.cols() > few_columns) solve_columns(right);
-    else solve_few(right);
+    if (right.cols() <= few_columns) return solve_few(right);
+    constexpr Eigen::Index some = 16;  // rows whose part of all columns is at hand
+    Rows rows(right.rows(), right.cols());
+    const auto for_blocks = [&](const auto& visit) {
+        for (Eigen::Index row = 0; row < right.rows(); row += some) visit(row, std::min(some, right.rows() - row));
+    };
+    for_blocks([&](Eigen::Index row, Eigen::Index count) { rows.middleRows(row, count) = right.middleRows(row, count); });
+    solve_many(rows);
+    for_blocks([&](Eigen::Index row, Eigen::Index count) { right.middleRows(row, count) = rows.middleRows(row, count); });
 }
 
 // L^-1 times right sides, box by box.
@@ -530,17 +550,6 @@ bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::Matrix
     if (inner.info() != Eigen::Success) return failed();
     wide_change_ = stiffness - across * inner.solve(across.transpose());
     return true;
-}
-
-// From L^-1 times right sides.
-void GridFactor::take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const {
-    if (wide_.empty()) return;
-    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(wide_change_.rows(), forward.cols());
-    for (const Part& part : wide_)
-        seen(part.sides, Eigen::all) += part.rows.transpose() * forward.middleRows(part.first, part.rows.rows());
-    const Eigen::MatrixXd change = wide_change_ * seen;
-    for (const Part& part : wide_)
-        forward.middleRows(part.first, part.rows.rows()).noalias() -= part.rows * change(part.sides, Eigen::all);
 }
 
 double GridFactor::reciprocal_condition() const {

@@ -97,7 +97,8 @@ class GridFactor {
     bool factor_box(Box& box, const Assemble& assemble, Scratch& scratch);
     void fill(Box& box, const Assemble& assemble, Scratch& scratch) const;
     void assemble_leaf(Box& box, const Assemble& assemble, Scratch& scratch) const;
-    void take_off_wide(Eigen::Ref<Eigen::MatrixXd> forward) const;
+    template <class Sides>
+    void take_off_wide(Sides&& forward) const;
     static double* column_of(Box& box, int c);
     void find_runs(const Box& box, int half, std::vector<Run>& runs) const;
     void take_in_halves(Box& box, Scratch& scratch) const;
@@ -109,9 +110,10 @@ class GridFactor {
     static void forward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
     static void backward_columns(const Eigen::MatrixXd& factor, double* y, int sides);
     void solve_few(Eigen::Ref<Eigen::MatrixXd> right) const;
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     struct Part;
     std::vector<Part> forward_parts(const Sparse& right) const;
-    void solve_columns(Eigen::Ref<Eigen::MatrixXd> right) const;
+    void solve_many(Rows& right) const;
 
     int cells_x_, cells_y_;
     int placed_ = 0;                      // nodes that have a place

@@ -37,6 +37,7 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool ro
         return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
     });
     read_probes(scene, *walk_, record);
+    if (rough) walk_->rest();  // what other toughnesses and moduli need is known for the most part
     record.steps = walk_->equilibria() - known;
     record.points = walk_->points();
     record.scene_text = scene.text;

@@ -39,12 +39,19 @@ struct LocalYield::Solved {
     void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {
         const std::vector<MaterialSlope>& here = cut.slopes_by(numbers);
         const Eigen::MatrixXd states = equilibrium->yields_to(loads);
-        for (Eigen::Index station = 0; station < states.cols(); ++station) {
-            std::vector<Vec2> displacement(fields());
-            for (int f = 0; f < fields(); ++f) displacement[f] = states.col(station).segment<2>(2 * f);
-            equilibrium->set_displacements(displacement, 0.0);
-            const Eigen::MatrixXd pull = states.transpose() * equilibrium->slopes(here).fields;
-            for (std::size_t n = 0; n < here.size(); ++n) by_number[n].col(station) -= sign * pull.col(n);
+        constexpr Eigen::Index together = 16;  // stations
+        for (Eigen::Index first = 0; first < states.cols(); first += together) {
+            const Eigen::Index count = std::min(together, states.cols() - first);
+            std::vector<Eigen::MatrixXd> pulls(here.size(), Eigen::MatrixXd(states.rows(), count));
+            for (Eigen::Index k = 0; k < count; ++k) {
+                std::vector<Vec2> displacement(fields());
+                for (int f = 0; f < fields(); ++f) displacement[f] = states.col(first + k).segment<2>(2 * f);
+                equilibrium->set_displacements(displacement, 0.0);
+                const Eigen::MatrixXd of_station = equilibrium->slopes(here).fields;
+                for (std::size_t n = 0; n < here.size(); ++n) pulls[n].col(k) = of_station.col(n);
+            }
+            for (std::size_t n = 0; n < here.size(); ++n)
+                by_number[n].middleCols(first, count) -= sign * (states.transpose() * pulls[n]);
         }
     }
 
@@ -164,6 +171,12 @@ void LocalYield::know_slopes(const std::vector<MaterialSlope>& numbers) {
             }
         slope = modes_ * slope * modes_.transpose();
     }
+    forget_slopes();
+}
+
+void LocalYield::forget_slopes() {
+    coarse_.reset();
+    fine_.reset();
 }
 
 // With s = A P^T N(d - P s) and K = N' the yields follow the depths d by (1 + A P^T K P)^-1 A P^T K.

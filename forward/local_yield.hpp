@@ -51,6 +51,9 @@ class LocalYield {
     /// Finds the slopes of the yield by these numbers, which `slope` asks for: once, and for several wheels side by side.
     void know_slopes(const std::vector<MaterialSlope>& numbers);
 
+    /// Gives back what finds them.
+    void forget_slopes();
+
     /// Slopes by a number of the energy and of the facets' forces, displacements as they are.
     struct Slope {
         double energy = 0;       // that the yield takes [J / unit]
@@ -76,8 +79,8 @@ class LocalYield {
     Eigen::MatrixXd modes_;       // [stations x modes] of the difference of the yields
     Eigen::VectorXd mode_yield_;  // [modes] [m/N]
     Eigen::MatrixXd yield_;
-    std::vector<Eigen::MatrixXd> slopes_;  // [numbers] of the yield [m/N / unit]; empty: not asked for yet
-    std::shared_ptr<Solved> coarse_, fine_;
+    std::vector<Eigen::MatrixXd> slopes_;    // [numbers] of the yield [m/N / unit]; empty: not asked for yet
+    std::shared_ptr<Solved> coarse_, fine_;  // null: slopes are known, or will not be asked for
 };
 
 }  // namespace crampfit

@@ -73,8 +73,10 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                          const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body),
-      equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_, threads > 1) {
+      equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_, threads > 1),
+      jobs_(threads > 1) {
     numbers_ = MaterialSlope::of(scene, numbers, body_);
+    if (numbers.empty()) equilibrium_.forget_yield_slopes();
     const double end = std::min(plan.end_time, plan.still_from);
     last_time_ = plan.linear ? 2 : loading_steps;
     time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
@@ -133,25 +135,31 @@ int Quasistatic::start_of_advance(int end) const {
     return start == places_[place].next.end() ? -1 : start->second;
 }
 
-// At a place where the equilibrium stands.
-Quasistatic::Missed Quasistatic::missed_at(std::size_t number, bool with_slopes) {
+// Of a place where the equilibrium stands.
+Quasistatic::Seen Quasistatic::boxes_about(std::size_t number) const {
     const std::vector<std::optional<TipBoxes>>& here = places_[number].boxes;
-    std::vector<std::optional<TipBoxes>> as_end;
-    if (const int start = start_of_advance(static_cast<int>(number)); start >= 0) as_end = places_[start].boxes;
-    std::vector<TipPlace> asked;
-    const auto ask = [&](const std::vector<std::optional<TipBoxes>>& boxes) {
-        for (std::size_t t = 0; t < boxes.size(); ++t)
-            if (boxes[t]) asked.push_back({*boxes[t], growing_[t].crack, growing_[t].at_end});
-        return asked.size();
+    Seen seen{{}, 0, false};
+    const auto see = [&](std::size_t t, const std::optional<TipBoxes>& boxes) {
+        if (boxes) seen.boxes.push_back({*boxes, growing_[t].crack, growing_[t].at_end});
     };
-    // A tip that has turned out of the boxes is seen in its own.
+    for (std::size_t t = 0; t < here.size(); ++t) see(t, here[t]);
+    seen.ahead = seen.boxes.size();
+    const int start = start_of_advance(static_cast<int>(number));
+    if (start < 0) return seen;
+    const std::vector<std::optional<TipBoxes>>& as_end = places_[start].boxes;
+    seen.as_end = !as_end.empty();
     for (std::size_t t = 0; t < as_end.size(); ++t) {
+        // A tip that has turned out of the boxes is seen in its own.
         const CrackTip& tip = equilibrium_.cracks().lines[growing_[t].crack].tip(growing_[t].at_end);
-        if (as_end[t] && tip.inside && !as_end[t]->hold(tip.position, body_.layout.cell)) as_end[t] = here[t];
+        const bool out = as_end[t] && tip.inside && !as_end[t]->hold(tip.position, body_.layout.cell);
+        see(t, out ? here[t] : as_end[t]);
     }
-    const std::size_t of_here = ask(here);
-    ask(as_end);
-    const std::vector<MissedEnergy> found = fine_tip_.missed(asked, equilibrium_, with_slopes);
+    return seen;
+}
+
+Quasistatic::Missed Quasistatic::missed_in(const Seen& seen, FineTip& fine_tip, const Equilibrium& equilibrium,
+                                           bool with_slopes) {
+    const std::vector<MissedEnergy> found = fine_tip.missed(seen.boxes, equilibrium, with_slopes);
     const auto sum = [](std::span<const MissedEnergy> some) {
         MissedEnergy all;
         for (const MissedEnergy& one : some) {
@@ -165,8 +173,8 @@ Quasistatic::Missed Quasistatic::missed_at(std::size_t number, bool with_slopes)
         return all;
     };
     const std::span<const MissedEnergy> all(found);
-    const MissedEnergy missed_here = sum(all.first(of_here));
-    return {missed_here, as_end.empty() ? missed_here : sum(all.subspan(of_here))};
+    const MissedEnergy here = sum(all.first(seen.ahead));
+    return {here, seen.as_end ? sum(all.subspan(seen.ahead)) : here};
 }
 
 LoadState Quasistatic::load_state(const Missed& missed) const {
@@ -230,12 +238,12 @@ bool Quasistatic::know_linear(std::size_t number) {
         const auto [second, good] = on_both_grids(follow, [&] { return solve(2); });
         if (!second) return false;
         if (!good && !parted(number)) return false;
-        const Missed missed = good ? missed_at(number, !numbers_.empty()) : Missed{};
+        const Missed missed = good ? missed_in(boxes_about(number), fine_tip_, equilibrium_, !numbers_.empty()) : Missed{};
         const LoadState full = good ? load_state(missed) : nothing(time_of(2));
         if (good) keep_probes(number, 2);
         Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};
         if (good && !numbers_.empty()) {
-            auto here = slopes_here(missed);
+            auto here = slopes_at(equilibrium_, body_, missed);
             if (!here) return false;
             slopes = std::move(*here);
         }
@@ -261,11 +269,11 @@ bool Quasistatic::know_linear(std::size_t number) {
         for (std::size_t d = 0; d < moved.size(); ++d)
             between.moved[d] = (1.0 - 0.5 * time) * before.moved[d] + 0.5 * time * moved[d];
         equilibrium_.set_displacements(u, time_of(time), between);
-        const Missed missed = missed_at(number, !numbers_.empty());
+        const Missed missed = missed_in(boxes_about(number), fine_tip_, equilibrium_, !numbers_.empty());
         keep(number, time, load_state(missed));
         if (time != 1) keep_probes(number, time);
         if (numbers_.empty()) continue;
-        auto slopes = slopes_here(missed);
+        auto slopes = slopes_at(equilibrium_, body_, missed);
         if (!slopes) return false;
         keep_slopes(number, time, std::move(*slopes));
     }
@@ -456,7 +464,9 @@ bool Quasistatic::find(std::size_t number, int time) {
     if (good) {
         if (!scene_.output.probes.places.empty()) equilibrium_.refine();
         place.known[time] = known_here(time);
-        keep(number, time, load_state(missed_at(number, false)));
+        const Seen seen = boxes_about(number);
+        seek_slopes(number, time, seen);
+        keep(number, time, load_state(missed_in(seen, fine_tip_, equilibrium_, false)));
         keep_probes(number, time);
         return true;
     }

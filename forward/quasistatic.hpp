@@ -3,6 +3,7 @@
 #include "forward/crack_driving.hpp"
 #include "forward/equilibrium.hpp"
 #include "forward/fine_tip.hpp"
+#include "forward/job_queue.hpp"
 
 #include <compare>
 #include <deque>
@@ -46,6 +47,9 @@ class Quasistatic {
     /// From now on states that are not known need not be found where others of the same place are: they follow from these,
     /// roughly.
     void set_rough(bool rough);
+
+    /// Waits for the derivatives that are being found, and gives back what only finds them, until equilibria are found again.
+    void rest();
 
     /// Follows the cracks to a station, counted from 0, where it is not known yet. False where the way ends before: every growing
     /// tip has reached a free surface, or there is no equilibrium. Of several tips `critical` of the station before tells which
@@ -92,6 +96,15 @@ class Quasistatic {
         std::vector<LoadState> states;
         std::vector<std::vector<Vec2>> probes;  // [readings] of the scene's [m]; empty: none
     };
+    struct Sought {
+        std::size_t job;
+        std::shared_ptr<std::optional<Slopes>> found;  // when it is done; none: the tangent is not positive definite
+    };
+    struct Seen {  // boxes about the tips of a place
+        std::vector<TipPlace> boxes;
+        std::size_t ahead;  // that are the first of them: for the advance from there
+        bool as_end;        // the others are for one that ends there
+    };
     struct Missed {           // by the grid where the equilibrium stands
         MissedEnergy here;    // seen in the boxes for the advance from there
         MissedEnergy as_end;  // and in those for the advance that ends there
@@ -121,10 +134,21 @@ class Quasistatic {
         std::vector<CrackFields::NewField> new_fields;  // that the growth from the place before has made
         std::map<int, LoadState> states;                // as they were found, whatever the shift
         std::map<int, Slopes> slopes;                   // their derivatives
+        std::map<int, Sought> sought;                   // those that jobs find, or have found
         std::map<int, std::vector<Vec2>> probes;     // what they read, whatever the shift; in a linear scene of times 0 and last
         std::vector<std::optional<TipBoxes>> boxes;  // [growing] about the tips' next advance; none: nothing is missed
         std::map<int, std::size_t> failed;           // times without an equilibrium; how many states were known
         std::set<int> guessed;                       // times at which the station's state is no more than roughly known
+    };
+
+    struct Beside {  // where derivatives are found as the walk goes on
+        explicit Beside(const Quasistatic& walk);
+        void enter(const Place& place);
+
+        Discretisation body;
+        Equilibrium equilibrium;
+        FineTip fine_tip;
+        const Place* entered = nullptr;
     };
 
     Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
@@ -164,15 +188,17 @@ class Quasistatic {
     void keep_slopes(std::size_t number, int time, Slopes slopes);
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
-    bool goes_with_load(const std::vector<Vec2>& drivers) const;
-    std::optional<Slopes> slopes_here(const Missed& missed);
-    void add_slopes(const Missed& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
-                    std::vector<LoadState>& slopes) const;
+    void seek_slopes(std::size_t number, int time, Seen seen);
+    bool goes_with_load(const Equilibrium& equilibrium, const std::vector<Vec2>& drivers) const;
+    std::optional<Slopes> slopes_at(Equilibrium& equilibrium, const Discretisation& body, const Missed& missed) const;
+    void add_slopes(const Equilibrium& equilibrium, const Missed& missed, const Equilibrium::Slopes& slope,
+                    const std::vector<LoadState>& of_grid, std::vector<LoadState>& slopes) const;
     void show_shifted(std::size_t number, int time);
     void enter(const Place& place);
     std::vector<std::optional<TipBoxes>> boxes_ahead() const;
     int start_of_advance(int end) const;
-    Missed missed_at(std::size_t number, bool with_slopes);
+    Seen boxes_about(std::size_t number) const;
+    static Missed missed_in(const Seen& seen, FineTip& fine_tip, const Equilibrium& equilibrium, bool with_slopes);
     LoadState load_state(const Missed& missed) const;
     bool parted(std::size_t number) const;
     LoadState nothing(double time) const;
@@ -203,6 +229,8 @@ class Quasistatic {
 
     struct Coarse;  // the second grid
     std::unique_ptr<Coarse> coarse_;
+    std::unique_ptr<Beside> beside_;  // made and used by jobs alone; null: none has been added since the last rest
+    JobQueue jobs_;
 };
 
 }  // namespace crampfit

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 // What is kept of each equilibrium beside its state: what the scene's probes read there, and the derivatives of both by numbers
 // of the materials, with which states are moved to first order.
@@ -27,6 +28,14 @@ std::optional<double> multiple(const std::vector<Vec2>& wanted, const std::vecto
 }
 
 }  // namespace
+
+Quasistatic::Beside::Beside(const Quasistatic& walk)
+    : body(walk.scene_, walk.materials_), equilibrium(walk.scene_, walk.plan_, walk.materials_, body, 1, &walk.equilibrium_),
+      fine_tip(walk.scene_, walk.plan_, walk.materials_, body, walk.numbers_) {}
+
+void Quasistatic::Beside::enter(const Place& place) {
+    if (std::exchange(entered, &place) != &place) equilibrium.restore(*place.snapshot);
+}
 
 // Takes off a third of the difference to the second grid from what probes read. Not beside a crack, where the wide cells know
 // next to nothing.
@@ -64,26 +73,27 @@ void Quasistatic::keep_slopes(std::size_t number, int time, Slopes slopes) {
 
 // Whether all that lies before the equilibrium is a multiple of its motion with these drivers: where nothing else loads a linear
 // scene.
-bool Quasistatic::goes_with_load(const std::vector<Vec2>& drivers) const {
-    const Boundary& boundary = equilibrium_.boundary();
-    bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium_.time() > 0.0;
-    const double time = equilibrium_.time();
+bool Quasistatic::goes_with_load(const Equilibrium& equilibrium, const std::vector<Vec2>& drivers) const {
+    const Boundary& boundary = equilibrium.boundary();
+    bool goes = plan_.linear && !boundary.has_dead_load() && equilibrium.time() > 0.0;
+    const double time = equilibrium.time();
     for (int d = 0; d < boundary.drivers() && goes; ++d) goes = boundary.travel(d, time) == time * drivers[d];
     return goes;
 }
 
 // Derivatives of the state where the equilibrium stands. What is prescribed has none.
-std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed) {
-    const Boundary& boundary = equilibrium_.boundary();
+std::optional<Quasistatic::Slopes> Quasistatic::slopes_at(Equilibrium& equilibrium, const Discretisation& body,
+                                                          const Missed& missed) const {
+    const Boundary& boundary = equilibrium.boundary();
     const Gauges gauges(scene_);
     std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
     for (int d = 0; d < boundary.drivers(); ++d)
-        if (equilibrium_.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
+        if (equilibrium.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
     drives[1][gauges.force] = gauges.force_direction;
     std::vector<Equilibrium::Motion> motions;
-    if (goes_with_load(drives[0])) {
-        motions.push_back({drives[0], equilibrium_.displacements()});
-        for (Vec2& u : motions[0].fields) u /= equilibrium_.time();
+    if (goes_with_load(equilibrium, drives[0])) {
+        motions.push_back({drives[0], equilibrium.displacements()});
+        for (Vec2& u : motions[0].fields) u /= equilibrium.time();
         if (const auto factor = multiple(drives[1], drives[0])) {
             motions.push_back(motions[0]);
             for (std::vector<Vec2>* of : {&motions[1].drivers, &motions[1].fields})
@@ -91,13 +101,13 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
         }
     }
     if (motions.size() < drives.size()) {
-        auto others = equilibrium_.motions({drives.begin() + static_cast<std::ptrdiff_t>(motions.size()), drives.end()});
+        auto others = equilibrium.motions({drives.begin() + static_cast<std::ptrdiff_t>(motions.size()), drives.end()});
         if (others.empty()) return std::nullopt;
         std::move(others.begin(), others.end(), std::back_inserter(motions));
     }
     const auto pulled = boundary.load_to_move(gauges.displacement, gauges.displacement_direction, motions[0].fields.size());
-    if (!pulled.empty()) motions.push_back(equilibrium_.yield_to(pulled));
-    const Equilibrium::Slopes slope = equilibrium_.slopes(numbers_);
+    if (!pulled.empty()) motions.push_back(equilibrium.yield_to(pulled));
+    const Equilibrium::Slopes slope = equilibrium.slopes(numbers_);
     std::vector<LoadState> found(numbers_.size());
     for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
         found[n].potential = slope.potential[n];
@@ -112,53 +122,52 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_here(const Missed& missed
         of_number.end_power = of_number.power;
     }
     const std::vector<LoadState> of_grid = found;
-    add_slopes(missed, slope, of_grid, found);
+    add_slopes(equilibrium, missed, slope, of_grid, found);
     std::vector<std::vector<Vec2>> moved;
     Slopes all;
     if (!scene_.output.probes.places.empty()) {
-        moved = equilibrium_.displacement_slopes(slope);
+        moved = equilibrium.displacement_slopes(slope);
         std::vector<const std::vector<Vec2>*> each;
         for (const std::vector<Vec2>& of_number : moved) each.push_back(&of_number);
-        all.probes = read_probes(scene_.output.probes, body_, equilibrium_.cracks(), each);
+        all.probes = read_probes(scene_.output.probes, body, equilibrium.cracks(), each);
     }
     // A tip's own G counts where that says when it moves.
     for (const GrowingTip& tip : growing_) {
-        if (leader_ || tip.ahead > 0 || !equilibrium_.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
-        if (moved.empty()) moved = equilibrium_.displacement_slopes(slope);
+        if (leader_ || tip.ahead > 0 || !equilibrium.cracks().lines[tip.crack].tip(tip.at_end).inside) continue;
+        if (moved.empty()) moved = equilibrium.displacement_slopes(slope);
         for (std::size_t n = 0; n < numbers_.size(); ++n)
-            found[n].tips[2 * tip.crack + tip.at_end].G =
-                equilibrium_.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
+            found[n].tips[2 * tip.crack + tip.at_end].G = equilibrium.release_slope(tip.crack, tip.at_end, numbers_[n], moved[n]);
     }
     all.states = std::move(found);
     return all;
 }
 
 // Adds the derivatives of what the grid misses to its own.
-void Quasistatic::add_slopes(const Missed& missed, const Equilibrium::Slopes& slope, const std::vector<LoadState>& of_grid,
-                             std::vector<LoadState>& slopes) const {
+void Quasistatic::add_slopes(const Equilibrium& equilibrium, const Missed& missed, const Equilibrium::Slopes& slope,
+                             const std::vector<LoadState>& of_grid, std::vector<LoadState>& slopes) const {
     const Gauges gauges(scene_);
     const Vec2 direction = gauges.force_direction;
-    const double potential = equilibrium_.potential();
+    const double potential = equilibrium.potential();
     std::vector<const MissedEnergy*> some;
     for (const MissedEnergy* of : {&missed.here, &missed.as_end})
         if (!of->by_number.empty()) some.push_back(of);
     Eigen::MatrixXd loads(slope.fields.rows(), some.size());
     for (std::size_t k = 0; k < some.size(); ++k)
         loads.col(k) = -Eigen::Map<const Eigen::VectorXd>(some[k]->by_displacement.data()->data(), loads.rows());
-    const Eigen::MatrixXd change = slope.fields.transpose() * equilibrium_.yields_to(loads);  // [numbers x some]
+    const Eigen::MatrixXd change = slope.fields.transpose() * equilibrium.yields_to(loads);  // [numbers x some]
     for (std::size_t k = 0; k < some.size(); ++k) {
         const bool as_end = some[k] == &missed.as_end;
         const double ratio = 1.0 + some[k]->energy / potential;
         for (int n = 0; n < static_cast<int>(numbers_.size()); ++n) {
             const double more = some[k]->by_number[n] + change(n, k);
             (as_end ? slopes[n].end_potential : slopes[n].potential) += more;
-            if (equilibrium_.boundary().has_dead_load()) continue;
+            if (equilibrium.boundary().has_dead_load()) continue;
             const double ratio_slope = (more - some[k]->energy * of_grid[n].potential / potential) / potential;
-            (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium_.power();
+            (as_end ? slopes[n].end_power : slopes[n].power) = ratio * of_grid[n].power + ratio_slope * equilibrium.power();
             if (!as_end)
                 slopes[n].reactions[gauges.force] =
                     ratio * of_grid[n].reactions[gauges.force] +
-                    ratio_slope * equilibrium_.reactions()[gauges.force].dot(direction) * direction;
+                    ratio_slope * equilibrium.reactions()[gauges.force].dot(direction) * direction;
         }
     }
 }
@@ -204,23 +213,41 @@ void Quasistatic::shift(const std::vector<double>& by) {
         for (const auto& [time, slopes] : places_[number].slopes) show_shifted(number, time);
 }
 
+// The derivatives of most equilibria will be asked for. So they are found as the walk goes on to the next ones, in the order in
+// which these were found: the same bits in a thread of their own or not.
+void Quasistatic::seek_slopes(std::size_t number, int time, Seen seen) {
+    if (numbers_.empty()) return;
+    Place& place = places_[number];
+    const auto found = std::make_shared<std::optional<Slopes>>();
+    const auto find = [this, &place = std::as_const(place), &known = place.known.at(time), seen = std::move(seen), found] {
+        if (!beside_) beside_ = std::make_unique<Beside>(*this);
+        beside_->enter(place);
+        beside_->equilibrium.set_displacements(known.displacement, time_of(known.time), known.contacts);
+        *found = slopes_at(beside_->equilibrium, beside_->body, missed_in(seen, beside_->fine_tip, beside_->equilibrium, true));
+    };
+    place.sought[time] = {jobs_.add(find), found};
+}
+
 bool Quasistatic::know_slopes(std::size_t number, int time) {
     Place& place = places_[number];
     if (place.slopes.count(time)) return true;
+    if (coarse() && !coarse()->know_slopes(number, time)) return false;
     Slopes slopes{std::vector<LoadState>(numbers_.size(), nothing(0.0)), {}};  // of what carries nothing
-    const auto find = [&] {
-        const auto known = place.known.find(time);
-        if (known == place.known.end() || (time == 0 && !equilibrium_.boundary().has_dead_load())) return true;
-        enter(place);
-        equilibrium_.set_displacements(known->second.displacement, time_of(time), known->second.contacts);
-        auto here = slopes_here(missed_at(number, true));
-        if (here) slopes = std::move(*here);
-        return here.has_value();
-    };
-    const auto [second, good] = on_both_grids([&] { return coarse()->know_slopes(number, time); }, find);
-    if (!second || !good) return false;
+    if (const auto sought = place.sought.find(time); sought != place.sought.end()) {
+        jobs_.wait_for(sought->second.job);
+        if (!*sought->second.found) return false;
+        slopes = std::move(**sought->second.found);
+        place.sought.erase(sought);
+    }
     keep_slopes(number, time, std::move(slopes));
     return true;
+}
+
+void Quasistatic::rest() {
+    for (const Place& place : places_)
+        for (const auto& [time, sought] : place.sought) jobs_.wait_for(sought.job);
+    beside_.reset();
+    if (coarse()) coarse()->rest();
 }
 
 std::vector<Vec2> Quasistatic::probes_at(std::size_t station_number, double time) {

@@ -211,6 +211,26 @@ TEST(GradientRecord, OfAWedgeTest) {
     check("wedge", wedge_across_rings(0.4e-3), 1e-4, 1e-4);
 }
 
+TEST(SystemWalk, ThreadsChangeNoBit) {
+    // Derivatives are found beside the walk; those found later, after a rest, too.
+    const Scene scene = wedge_across_rings(0.4e-3);
+    Scene other = scene;
+    set_number(other, "materials.LW.E", 1.02 * get_number(scene, "materials.LW.E"));
+    set_number(other, "materials.EW.toughness", 1.5 * get_number(scene, "materials.EW.toughness"));
+    KeptWalk alone(scene, numbers, 1), with_others(scene, numbers, 2);
+    const auto check_run = [&](const Scene& moved, bool rough) {
+        const Record a = alone.run(moved, {}, rough), b = with_others.run(moved, {}, rough);
+        ASSERT_EQ(a.series.size(), b.series.size());
+        for (std::size_t i = 0; i < a.series.size(); ++i) {
+            EXPECT_EQ(a.series[i].force, b.series[i].force) << i;
+            EXPECT_EQ(a.series[i].crack_length, b.series[i].crack_length) << i;
+            EXPECT_EQ(a.series[i].displacement, b.series[i].displacement) << i;
+        }
+    };
+    check_run(scene, false);
+    for (const bool rough : {true, false}) check_run(other, rough);
+}
+
 // Displacements in the wood, on either side of the crack and ahead of it.
 void check_probes(const char* name, Scene scene, double step, double tolerance, const std::vector<std::string>& keys) {
     scene.output.probes = {{{1e-3, 7e-3}, {1.3e-3, 3.1e-3}, {4e-3, 8e-3}, {6e-3, 2e-3}, {8.9e-3, 5.2e-3}}, {}, true};

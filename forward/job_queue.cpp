@@ -1,0 +1,53 @@
+#include "forward/job_queue.hpp"
+
+#include <utility>
+
+namespace crampfit {
+
+JobQueue::~JobQueue() {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+    changed_.notify_all();
+}
+
+std::size_t JobQueue::add(std::function<void()> job) {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(job));
+    changed_.notify_all();
+    if (beside_ && !thread_.joinable())
+        thread_ = std::jthread([this] {
+            std::unique_lock held(mutex_);
+            while (true) {
+                changed_.wait(held, [&] { return over_ || !waiting_.empty(); });
+                if (over_ || error_) return;
+                work(held);
+            }
+        });
+    return added_++;
+}
+
+void JobQueue::wait_for(std::size_t job) {
+    std::unique_lock lock(mutex_);
+    while (!beside_ && done_ <= job && !error_) work(lock);
+    changed_.wait(lock, [&] { return done_ > job || error_; });
+    if (done_ <= job) std::rethrow_exception(error_);
+}
+
+// The next job.
+void JobQueue::work(std::unique_lock<std::mutex>& lock) {
+    const std::function<void()> job = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    std::exception_ptr error;
+    try {
+        job();
+    } catch (...) {
+        error = std::current_exception();
+    }
+    lock.lock();
+    if (error) error_ = error;
+    else ++done_;
+    changed_.notify_all();
+}
+
+}  // namespace crampfit

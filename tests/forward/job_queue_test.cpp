@@ -1,0 +1,65 @@
+#include "forward/job_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace crampfit {
+namespace {
+
+TEST(UnitJobQueue, JobsAreDoneInTheirOrder) {
+    for (const bool beside : {false, true}) {
+        std::vector<int> done;
+        JobQueue jobs(beside);
+        std::vector<std::size_t> numbers;
+        for (int k = 0; k < 100; ++k) numbers.push_back(jobs.add([&done, k] { done.push_back(k); }));
+        jobs.wait_for(numbers[40]);
+        if (!beside) {
+            EXPECT_EQ(done.size(), 41u) << "no more than is waited for";
+        }
+        jobs.wait_for(numbers.back());
+        ASSERT_EQ(done.size(), 100u);
+        for (int k = 0; k < 100; ++k) EXPECT_EQ(done[k], k);
+        jobs.wait_for(numbers[3]);  // once more
+    }
+}
+
+TEST(UnitJobQueue, ThrowsWhatAJobHasThrown) {
+    for (const bool beside : {false, true}) {
+        JobQueue jobs(beside);
+        const std::size_t good = jobs.add([] {});
+        const std::size_t bad = jobs.add([] { throw std::runtime_error("bad"); });
+        jobs.wait_for(good);
+        const std::size_t after = jobs.add([] {});
+        EXPECT_THROW(jobs.wait_for(bad), std::runtime_error);
+        EXPECT_THROW(jobs.wait_for(after), std::runtime_error);
+        jobs.wait_for(good);
+    }
+}
+
+TEST(UnitJobQueue, DropsWhatIsNotBegun) {
+    std::atomic<int> done = 0;
+    {
+        JobQueue jobs(true);
+        std::atomic<bool> begun = false, go_on = false;
+        jobs.add([&] {
+            begun = true;
+            begun.notify_one();
+            go_on.wait(false);
+            ++done;
+        });
+        begun.wait(false);
+        for (int k = 0; k < 10; ++k) jobs.add([&] { ++done; });
+        std::jthread([&] {
+            go_on = true;
+            go_on.notify_one();
+        }).join();
+    }
+    EXPECT_GE(done, 1);
+    EXPECT_LE(done, 11);
+}
+
+}  // namespace
+}  // namespace crampfit
