@@ -28,9 +28,18 @@ std::size_t JobQueue::add(std::function<void()> job) {
 
 void JobQueue::wait_for(std::size_t job) {
     std::unique_lock lock(mutex_);
-    while (!beside_ && done_ <= job && !error_) work(lock);
-    changed_.wait(lock, [&] { return done_ > job || error_; });
-    if (done_ <= job) std::rethrow_exception(error_);
+    wait(lock, job + 1);
+}
+
+void JobQueue::wait_for_all() {
+    std::unique_lock lock(mutex_);
+    wait(lock, added_);
+}
+
+void JobQueue::wait(std::unique_lock<std::mutex>& lock, std::size_t least_done) {
+    while (!beside_ && done_ < least_done && !error_) work(lock);
+    changed_.wait(lock, [&] { return done_ >= least_done || error_; });
+    if (done_ < least_done) std::rethrow_exception(error_);
 }
 
 // The next job.

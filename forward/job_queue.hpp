@@ -25,7 +25,10 @@ class JobQueue {
     /// Returns when this job is done. Throws what it or one before it has thrown.
     void wait_for(std::size_t job);
 
+    void wait_for_all();  // that have been added
+
   private:
+    void wait(std::unique_lock<std::mutex>& lock, std::size_t least_done);
     void work(std::unique_lock<std::mutex>& lock);
 
     bool beside_, over_ = false;

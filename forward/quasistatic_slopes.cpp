@@ -244,8 +244,7 @@ bool Quasistatic::know_slopes(std::size_t number, int time) {
 }
 
 void Quasistatic::rest() {
-    for (const Place& place : places_)
-        for (const auto& [time, sought] : place.sought) jobs_.wait_for(sought.job);
+    jobs_.wait_for_all();
     beside_.reset();
     if (coarse()) coarse()->rest();
 }
