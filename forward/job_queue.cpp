@@ -50,7 +50,7 @@ void JobQueue::work(std::unique_lock<std::mutex>& lock) {
     std::exception_ptr error;
     try {
         job();
-    } catch (...) {
+    } catch (...) {  // kept for whoever waits: an exception must not end a thread
         error = std::current_exception();
     }
     lock.lock();

@@ -33,11 +33,10 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool ro
     }
     walk_->set_rough(rough);
     walk_->shift(by);
-    Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) {
-        return !(options.stop_requested && options.stop_requested->load(std::memory_order_relaxed));
-    });
+    const auto is_stopped = [&] { return options.stop_requested && options.stop_requested->load(std::memory_order_relaxed); };
+    Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) { return !is_stopped(); });
     read_probes(scene, *walk_, record);
-    if (rough) walk_->rest();  // what other toughnesses and moduli need is known for the most part
+    if (rough && !is_stopped()) walk_->rest();  // what other toughnesses and moduli need is known for the most part
     record.steps = walk_->equilibria() - known;
     record.points = walk_->points();
     record.scene_text = scene.text;
