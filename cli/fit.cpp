@@ -27,7 +27,7 @@ ExitStatus exit_status(FitStatus status) {
 }
 
 Fit run(const Study& study, const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
-    RunsLine line(common);
+    RunsLine line(common, "left at most");
     auto options = study_options<FitOptions>(arguments, common, ranks);
     options.progress = [&](const FitProgress& progress) {
         const std::string most = progress.runs <= progress.max_runs ? fmt::format(" of {} at most", progress.max_runs) : "";

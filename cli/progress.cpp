@@ -42,9 +42,9 @@ std::string duration_text(double seconds) {
     return fmt::format("{} s", whole);
 }
 
-ProgressLine::ProgressLine(const CommonOptions& common, std::string counted)
-    : common_(common), counted_(std::move(counted)), on_terminal_(::isatty(STDERR_FILENO) == 1), started_(Clock::now()),
-      last_bar_(started_), last_line_(started_) {}
+ProgressLine::ProgressLine(const CommonOptions& common, std::string counted, std::string left)
+    : common_(common), counted_(std::move(counted)), left_(std::move(left)), on_terminal_(::isatty(STDERR_FILENO) == 1),
+      started_(Clock::now()), last_bar_(started_), last_line_(started_) {}
 
 ProgressLine::~ProgressLine() {
     if (bar_is_drawn_) std::fputs("\r\033[K", stderr);
@@ -59,7 +59,7 @@ void ProgressLine::show(double fraction, long count, const std::string& details)
     const double elapsed = std::chrono::duration<double>(now - started_).count();
     std::string text = fmt::format("{:3.0f} %", 100 * fraction);
     if (elapsed > 0) text += fmt::format("  {} {}/s", rate_text(static_cast<double>(count) / elapsed), counted_);
-    if (fraction > 0) text += fmt::format("  {} left", duration_text(elapsed * (1 - fraction) / fraction));
+    if (fraction > 0) text += fmt::format("  {} {}", duration_text(elapsed * (1 - fraction) / fraction), left_);
     text += "  " + details;
 
     if (bar_is_due) {

@@ -11,8 +11,8 @@ namespace crampfit::cli {
 /// nothing with --quiet. The plain lines go to the log as well.
 class ProgressLine {
   public:
-    /// `counted` names what is done many times, such as "steps".
-    ProgressLine(const CommonOptions& common, std::string counted);
+    /// `counted` names what is done many times, such as "steps"; `left` stands behind the time that is left.
+    ProgressLine(const CommonOptions& common, std::string counted, std::string left = "left");
     ~ProgressLine();
     ProgressLine(const ProgressLine&) = delete;
     ProgressLine& operator=(const ProgressLine&) = delete;
@@ -28,6 +28,7 @@ class ProgressLine {
 
     const CommonOptions& common_;
     std::string counted_;
+    std::string left_;
     bool on_terminal_;
     bool bar_is_drawn_ = false;
     Clock::time_point started_;

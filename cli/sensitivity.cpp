@@ -25,7 +25,7 @@ ExitStatus exit_status(SensitivityStatus status) {
 }
 
 Sensitivity run(const Study& study, const StudyArguments& arguments, const CommonOptions& common, Ranks& ranks) {
-    RunsLine line(common);
+    RunsLine line(common, "left");
     auto options = study_options<SensitivityOptions>(arguments, common, ranks);
     options.progress = [&](const SensitivityProgress& progress) {
         line.show(progress.runs, progress.planned, progress.failure,

@@ -29,7 +29,7 @@ Study open_study(const std::filesystem::path& file, const CommonOptions& common)
 /// Shows each forward run as it ends.
 class RunsLine {
   public:
-    explicit RunsLine(const CommonOptions& common) : common_(common), line_(common, "runs") {}
+    RunsLine(const CommonOptions& common, const char* left) : common_(common), line_(common, "runs", left) {}
 
     /// `failure` says why the run failed, if it did.
     void show(int runs, int most, const std::string& failure, const std::string& details);

@@ -52,28 +52,39 @@ class Reporter {
     // After a run that is none of the fit's own.
     void look() {
         const std::lock_guard lock(mutex_);
-        progress_.seconds = seconds_since(begin_);
-        progress_.failure.clear();
-        if (options_.progress) {
-            options_.progress(progress_);
-        }
+        tell("");
     }
 
     void add(const Run& run) {
         const std::lock_guard lock(mutex_);
         ++progress_.runs;
-        progress_.seconds = seconds_since(begin_);
         if (run.evaluation->usable() && run.evaluation->misfit < progress_.best_misfit) {
-            progress_.best_misfit = run.evaluation->misfit;
-            progress_.best = in_units(box_, run.x);
+            take_as_best(run);
         }
-        progress_.failure = failure_text(study_, box_.values(run.x), *run.evaluation);
+        tell(failure_text(study_, box_.values(run.x), *run.evaluation));
+    }
+
+    // All runs have been weighed anew: misfits of before say nothing any more.
+    void start_anew_from(const Run& best) {
+        const std::lock_guard lock(mutex_);
+        take_as_best(best);
+        tell("");
+    }
+
+  private:
+    void tell(const std::string& failure) {
+        progress_.seconds = seconds_since(begin_);
+        progress_.failure = failure;
         if (options_.progress) {
             options_.progress(progress_);
         }
     }
 
-  private:
+    void take_as_best(const Run& run) {
+        progress_.best_misfit = run.evaluation->misfit;
+        progress_.best = in_units(box_, run.x);
+    }
+
     const FitOptions& options_;
     const Study& study_;
     const UnitBox& box_;
@@ -170,7 +181,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     RunStore store(options.keeping, study, options.stop_requested);
     const UnitBox box(study.parameters);
     Reporter reporter(options, study, box);
-    StudyRuns runs(study, options, store, 1.0, [&](const Run& run) { reporter.add(run); });
+    StudyRuns runs(
+        study, options, store, 1.0, [&](const Run& run) { reporter.add(run); },
+        [&](const Run& best) { reporter.start_anew_from(best); });
     const bool by_walks = runs.by_walks(), only_toughness = runs.only_toughness();
     const StudyModel& model = runs.model();
     Objective& objective = runs.objective();

@@ -29,7 +29,7 @@ struct FitOptions {
     int threads = 0;                                    // forward runs side by side; 0: one a core
     Forward forward;                                    // empty: crampfit::simulate
     bool cheap_runs = false;                            // of `forward`: profile and posterior may make thousands
-    std::function<void(const FitProgress&)> progress;   // after every forward run, one call at a time; may be empty
+    std::function<void(const FitProgress&)> progress;   // after every forward run and weighing, one call at a time; may be empty
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random
     RunKeeping keeping;                                 // of the forward runs, as they end

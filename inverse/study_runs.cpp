@@ -46,7 +46,8 @@ Study on_wide_cells(const Study& study) {
     return wide;
 }
 
-StudyRuns::StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run)
+StudyRuns::StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run,
+                     Objective::OnRun on_weighing)
     : study_(study), options_(options), store_(store), widening_(widening), threads_(thread_count(options.threads)),
       walks_(study, std::max(1, threads_ / std::max(1, static_cast<int>(study.experiments.size())))),
       only_toughness_(!options.forward && walks_.only_toughness()),
@@ -65,7 +66,8 @@ StudyRuns::StudyRuns(const Study& study, const FitOptions& options, RunStore& st
               threads_, by_walks_ || in_order_ ? nullptr : options.farm),
       objective_(
           model_.box().size(), [this](const Eigen::VectorXd& x, int share) { return run(x, share); }, study.optimizer.max_runs,
-          in_order_ ? 1 : shared_.places(), options.stop_requested, std::move(on_run)) {}
+          in_order_ ? 1 : shared_.places(), options.stop_requested, std::move(on_run)),
+      on_weighing_(std::move(on_weighing)) {}
 
 Forward StudyRuns::forward() const {
     return options_.forward ? options_.forward : by_walks_ || only_toughness_ ? walks_.exact() : walks_.in_any_order();
@@ -196,6 +198,9 @@ bool StudyRuns::weigh_anew(double least) {
         model_.weigh(evaluation, model_.box().values(run.x));
         return evaluation;
     });
+    if (on_weighing_) {
+        on_weighing_(*objective_.best());
+    }
     return true;
 }
 

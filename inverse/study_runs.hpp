@@ -21,8 +21,10 @@ Study on_wide_cells(const Study& study);
 class StudyRuns {
   public:
     /// `widening`: how many times as wide as the fit's own these cells are; the store keeps runs of all grids. All that is given
-    /// must outlive this. Throws InputError for a study that cannot be fitted.
-    StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run);
+    /// must outlive this. `on_weighing` is told the best run once all are weighed anew. Throws InputError for a study that cannot
+    /// be fitted.
+    StudyRuns(const Study& study, const FitOptions& options, RunStore& store, double widening, Objective::OnRun on_run,
+              Objective::OnRun on_weighing = {});
     StudyRuns(const StudyRuns&) = delete;
     StudyRuns& operator=(const StudyRuns&) = delete;
 
@@ -75,6 +77,7 @@ class StudyRuns {
     Nearby nearby_;
     Sharing shared_;
     Objective objective_;
+    Objective::OnRun on_weighing_;
 };
 
 }  // namespace crampfit

@@ -312,9 +312,12 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
     study.parameters = {bar_modulus()};
     FitOptions options;
     options.threads = 1;
+    FitProgress last_told;
+    options.progress = [&](const FitProgress& progress) { last_told = progress; };
     for (const char* method : {"auto", "ceres", "bobyqa", "sbplx"}) {
         study.optimizer.method = method;
         const Fit fit = fit_study(study, options);
+        EXPECT_EQ(last_told.best_misfit, fit.misfit) << method;  // not that of another weighing
         EXPECT_EQ(fit.status, FitStatus::converged) << method;
         EXPECT_NEAR(fit.residuals.back().sigma, 2.0, 1e-9) << method;
         const double widened = std::sqrt(std::max(1.0, fit.reduced_chi_square));
