@@ -194,22 +194,18 @@ double Station::critical_time(double toughness, bool beyond) const {
         slope.push_back(finite_advance ? state.power - further->second[1] : 0.0);
     }
     if (time.empty()) return never;
-    // From a state on as a power of the time: the one that its slope says or, without, the next state.
-    const auto power_law = [&](std::size_t start, std::size_t other) {
+    // From a state on as a power of the time: the one that its slope says or, without, that of linear wood. Not what a second
+    // state says, which is known or not as the way to here was.
+    const auto power_law = [&](std::size_t start) {
         const double released = excess[start] + needed;
-        const double ratio = (excess[other] + needed) / released;
-        double power = 2.0;
-        if (finite_advance) power = slope[start] * time[start] / released;
-        else if (ratio > 0.0 && time[other] > 0.0 && other != start)
-            power = std::log(ratio) / std::log(time[other] / time[start]);
+        const double power = finite_advance ? slope[start] * time[start] / released : 2.0;
         return time[start] * std::pow(needed / released, 1.0 / std::max(power, 0.5));
     };
     if (beyond && excess.back() < 0.0) {
-        const std::size_t last = time.size() - 1;
-        const double reached = excess[last] + needed > 0.0 ? power_law(last, last > 0 ? last - 1 : last) : never;
+        const double reached = excess.back() + needed > 0.0 ? power_law(time.size() - 1) : never;
         return reached <= still_from * (1.0 + 1e-12) ? reached : never;
     }
-    if (time.size() == 1) return beyond || (excess[0] >= 0.0 && time[0] > 0.0) ? power_law(0, 0) : excess[0] >= 0.0 ? 0.0 : never;
+    if (time.size() == 1) return beyond || (excess[0] >= 0.0 && time[0] > 0.0) ? power_law(0) : excess[0] >= 0.0 ? 0.0 : never;
     double found = never;
     if (linear) {  // times 0, T/2, T
         const double T = time[2];
@@ -224,7 +220,7 @@ double Station::critical_time(double toughness, bool beyond) const {
         if (excess[i - 1] >= 0.0) {
             // Below what is known: the energy released goes as a power of the time.
             if (time[i - 1] == 0.0) return 0.0;
-            return power_law(i - 1, i);
+            return power_law(i - 1);
         }
         double low = 0.0, high = 1.0;
         for (int k = 0; k < 60; ++k) {

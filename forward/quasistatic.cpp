@@ -287,6 +287,7 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
     ++equilibria_;
     outcome_ = equilibrium_.solve(time);
     if (outcome_ != Equilibrium::Outcome::solved) return false;
+    if (!std::isfinite(potential)) return true;  // from the unloaded specimen, where a load acts from the start
     const double change = equilibrium_.potential() - potential;
     const double rounding = 1e-6 * std::abs(potential) + equilibrium_.negligible_work();
     // With friction the potential holds what has been dissipated, known to the trapezoid rule of a step.

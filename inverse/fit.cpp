@@ -146,8 +146,9 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
     fill_parameters(fit, box, box.initial(), nothing);
     fit.misfit = nothing.reduced_chi_square;
     fit.reduced_chi_square = nothing.reduced_chi_square;
-    fit.message += objective.runs().empty() ? "No run was made."
-                                            : "No run ended well; the first: " + objective.runs().front().evaluation->status;
+    fit.message += objective.runs().empty()
+                       ? "No run was made. "
+                       : fmt::format("No run ended well; the first: {}. ", objective.runs().front().evaluation->status);
 }
 
 const char* explain(FitStatus status) {

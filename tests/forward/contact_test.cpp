@@ -224,6 +224,40 @@ TEST(VerificationPlates, ABlockSpreadsEvenly) {
     }
 }
 
+// A load that acts from the start needs no equilibrium before it: a plate without friction, pushed by a constant force, or by a
+// traction on another side, u = F L / (E W B) in plane stress. Contact gives way by a tenth of a cell, a hundredth of the block.
+TEST(VerificationPlates, AConstantLoadPressesABlock) {
+    Scene scene = block({10e-3, 10e-3}, 1e-3);
+    scene.model.plane = PlaneCondition::stress;
+    scene.edges = {guided("bottom", Side::bottom, 1), guided("left", Side::left, 0)};
+    const Polygon plate{{Vec2(-5e-3, 10e-3), Vec2(15e-3, 10e-3), Vec2(15e-3, 15e-3), Vec2(-5e-3, 15e-3)}};
+    scene.bodies = {sliding("plate", plate, {0.0, 0.0})};
+    scene.measure = {"plate", "plate"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.stop.time = 1.0;
+    const Material& wood = scene.materials.at("EW");
+    Scene pushed = scene;
+    pushed.bodies[0].free = {false, true};
+    const double load = 0.01 * wood.youngs_modulus * 10e-3 * scene.model.thickness;  // [N]
+    pushed.bodies[0].force = {0.0, -load};
+    const Record by_force = simulate(pushed);
+    EXPECT_EQ(by_force.status, RunStatus::finished) << by_force.message;
+    EXPECT_NEAR(by_force.series.back().displacement / 0.1e-3, 1, 0.015);
+    EXPECT_NEAR(by_force.series.back().force / load, 1, 1e-6);
+    // With the plate at rest the traction squeezes the wood against it: stress nu s upon the plate.
+    Edge side;
+    side.name = "right";
+    side.side = Side::right;
+    const double pressure = 0.05 * wood.youngs_modulus;
+    side.traction = Vec2(-pressure, 0.0);
+    Scene squeezed = scene;
+    squeezed.edges.push_back(side);
+    const Record by_traction = simulate(squeezed);
+    EXPECT_EQ(by_traction.status, RunStatus::finished) << by_traction.message;
+    const double push = wood.poisson_ratio * pressure * 10e-3 * scene.model.thickness;
+    EXPECT_NEAR(by_traction.reactions.back().force.back().norm() / push, 1, 0.015);
+}
+
 // Checks F_H = F_V / (2 tan(A / 2)), without friction (REFERENCES), and returns how far off it is.
 double statics_error(const Scene& scene, double angle, double travel) {
     Rest rest(scene);

@@ -50,6 +50,25 @@ double force_at_displacement(const Record& record, double displacement) {
 
 // ---- the highest load between two places
 
+// What is known of a place hangs on the way to it; when its crack moves does not.
+TEST(UnitStation, WhenACrackMovesDoesNotHangOnWhatElseIsKnown) {
+    Station station;
+    station.linear = false;
+    station.still_from = INFINITY;
+    station.moving = {{0, true, {Vec2(5e-3, 5e-3)}}};  // advance 0
+    const auto state = [](double time, double G) {
+        LoadState s;
+        s.time = time;
+        s.tips.resize(2);
+        s.tips[1].G = G;
+        return s;
+    };
+    station.states[4] = state(4.0, 225.0);
+    EXPECT_NEAR(station.critical_time(100.0), 4.0 * std::sqrt(100.0 / 225.0), 1e-12);
+    station.states[5] = state(5.0, 500.0);
+    EXPECT_NEAR(station.critical_time(100.0), 4.0 * std::sqrt(100.0 / 225.0), 1e-12);
+}
+
 TEST(UnitLoadPeak, IsExactWhereTheEnergyIsACubic) {
     // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2
     // there.
