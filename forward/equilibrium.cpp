@@ -39,6 +39,9 @@ constexpr int quick_iterations = 10;
 constexpr int sorting = 6;       // iterations without an end after which faces that rub are sorted into those that grip and slide
 constexpr int most_trials = 12;  // of a part of a Newton step
 
+// Stiffness, of the wood's times the thickness, with which a specimen that bodies do not hold yet is kept from going far.
+constexpr double loose_stiffness = 0.01;
+
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
 constexpr double least_strain = 1e-5;
 
@@ -357,6 +360,12 @@ void Equilibrium::add_hinges() {
     }
 }
 
+// A specimen that bodies are to hold, none of which presses yet, goes to them by steps with a tangent that weak springs hold. No
+// load is on these either.
+void Equilibrium::set_loose(bool loose) {
+    if (std::exchange(loose_, loose) != loose) factor_.mark_all();
+}
+
 // Whether most of the specimen moves with this unknown without any force: then it is held too little.
 bool Equilibrium::moves_most(int hinge) const {
     constexpr double moves = 1e-3, most_mass = 0.5;  // of the largest motion; of the specimen
@@ -396,6 +405,11 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
         for_groups_of(cell, [&](std::span<const int> fields, int first_point, int count) {
             elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
             if (!plan_.linear) factored_at_[first_point] = gradient_at(body_, first_point, displacement_);
+            if (loose_) {
+                const double spring =
+                    loose_stiffness * body_.points.stiffest(first_point) * body_.layout.thickness / body_.layout.cells();
+                elements.push_back(element(fields, spring * Eigen::Matrix<double, 8, 8>::Identity()));
+            }
         });
         const auto [first, last] = extra_.equal_range(cell);
         for (auto other = first; other != last; ++other) elements.push_back(other->second);
@@ -486,6 +500,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     const auto factor = [&] {
         constexpr int most_hinges = 6;
         drop_hinges();
+        set_loose(false);
         while (!(slack > 0.0 && factor_tangent(true, slack)) && !factor_tangent(true, 0.0) && !factor_tangent(false, 0.0))
             if (hinges_.size() == most_hinges || !hold_hinge()) return false;
         return std::ranges::none_of(hinges_, [&](int hinge) { return moves_most(hinge); });
@@ -499,11 +514,15 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
     double residual = largest_residual();
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         if (renew && !factor()) {
-            if (time_ == time) return Outcome::mechanism;
+            if (sliding_.empty()) return Outcome::mechanism;
+            const bool is_there = time_ == time;
             time_ = time;  // held by bodies that do not touch yet, perhaps: try with these where they are going
             std::fill(still_to_go_.begin(), still_to_go_.end(), Vec2::Zero());
             find_forces();
-            if (!factor()) return Outcome::mechanism;
+            if (is_there || !factor()) {  // then let it go to them
+                set_loose(true);
+                if (!factor_tangent(false)) return Outcome::mechanism;
+            }
         }
         const Eigen::VectorXd start = out_of_balance();
         Eigen::VectorXd load = start + step_load_;
@@ -525,6 +544,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
         if (residual <= balance * scale) {
+            if (loose_ && !factor()) return Outcome::mechanism;
             settle();
             return Outcome::solved;
         }

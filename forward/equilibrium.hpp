@@ -148,6 +148,7 @@ class Equilibrium {
     void drop_hinges();
     void add_hinges();
     bool moves_most(int hinge) const;
+    void set_loose(bool loose);
     GridFactor::Element element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const;
     void couple_fields(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness);
     void couple_points(bool geometric);
@@ -240,6 +241,7 @@ class Equilibrium {
     GridFactor factor_;
     LoosePieces pieces_;         // that cracks have cut free
     std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis
+    bool loose_ = false;         // whether weak springs hold the specimen in the tangent until bodies do
     std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points
     int equations_ = 0;
     std::vector<char> slips_;                        // [pairs, or fewer] of faces that stick, those that slide all the same

@@ -201,7 +201,8 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
 
 }  // namespace
 
-Comparison::Comparison(const Experiment& experiment, double model_resolution) : model_resolution_(model_resolution) {
+Comparison::Comparison(const Experiment& experiment, double model_resolution)
+    : model_resolution_(model_resolution), longest_(experiment.scene.stop.crack_length) {
     if (experiment.fields) {
         fields_.emplace(experiment);
         remarks_.push_back(fields_->remark());
@@ -326,7 +327,10 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
     const Curve crack = continued(rows.x(), rows.y(), arrival_end_).smoothed(arrival_window_);
     const double shortest = rows.mean(from, from + arrival_window_);
     // A test may end with a jump, which its last row alone has seen.
-    const double longest = std::max(rows.mean(to - arrival_window_, to), rows.y().back() - 3 * noise);
+    double longest = std::max(rows.mean(to - arrival_window_, to), rows.y().back() - 3 * noise);
+    if (longest_) {  // beside where rows are cut off their noise has one side only
+        longest = std::min(longest, *longest_ - 2 * noise);
+    }
     const double growth = longest - shortest;
     if (!(growth > 3 * noise)) {
         remarks_.push_back(experiment.name + ": the crack did not grow by more than its noise; crack_length is not used.");
@@ -449,7 +453,9 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
     const std::size_t rows = abscissa.size();
     const bool ends_with_jump =
         rows > 1 && abscissa[rows - 1] - abscissa[rows - 2] < 1e-8 * end && lengths[rows - 1] > lengths[rows - 2];
-    const Curve length = continued(abscissa, lengths, ends_with_jump ? arrival_end_ : end);
+    // So does one that ends the run by its length.
+    const bool ends_run = longest_ && lengths[rows - 1] >= *longest_ * (1 - 1e-9);
+    const Curve length = continued(abscissa, lengths, ends_with_jump || ends_run ? std::max(end, arrival_end_) : end);
     const Curve crack = length.smoothed(arrival_window_);
     const double longest = *std::max_element(crack.y().begin(), crack.y().end());
     std::vector<double> values;

@@ -74,12 +74,13 @@ class Comparison {
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
 
     double model_resolution_;
-    bool by_time_ = false;          // stations stand on time [s] instead of displacement [m]
-    std::vector<double> abscissa_;  // measured displacement [m] or time [s], a row
-    double abscissa_noise_ = 0;     // one sigma [m] or [s]
-    double arrival_window_ = 0;     // of the average of crack length [m] or [s]
-    double arrival_end_ = 0;        // of the measured crack lengths
-    double pace_ = 0;               // mean displacement (time) a length of growth in the test [m/m] or [s/m]
+    std::optional<double> longest_;  // crack, that ends runs [m]
+    bool by_time_ = false;           // stations stand on time [s] instead of displacement [m]
+    std::vector<double> abscissa_;   // measured displacement [m] or time [s], a row
+    double abscissa_noise_ = 0;      // one sigma [m] or [s]
+    double arrival_window_ = 0;      // of the average of crack length [m] or [s]
+    double arrival_end_ = 0;         // of the measured crack lengths
+    double pace_ = 0;                // mean displacement (time) a length of growth in the test [m/m] or [s/m]
     std::vector<std::pair<double, double>> force_tiles_;   // from, to [m] or [s]: one a station of force
     std::vector<std::pair<double, double>> length_tiles_;  // the same of crack length
     std::optional<FieldComparison> fields_;

@@ -85,6 +85,52 @@ bool is_measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
 }
 
+std::string file_of(const Experiment& test) {
+    return test.scene.file.empty() ? "scene of " + test.name : test.scene.file.string();
+}
+
+// A crack that has come to where each run ends is that long from there on, in data and runs alike; of forces from there on no run
+// has anything to say.
+void cut_at_crack_length(const Experiment& test, const std::vector<double>& abscissa, bool by_time, CoveredData& covered) {
+    Curves& data = covered.curves;
+    if (!test.scene.stop.crack_length || !is_measured(data.crack_length)) {
+        return;
+    }
+    const double longest = *test.scene.stop.crack_length;
+    double first = unbounded, beyond = unbounded, most = 0;
+    for (std::size_t i = 0; i < abscissa.size(); ++i) {
+        if (std::isnan(abscissa[i]) || std::isnan(data.crack_length[i])) {
+            continue;
+        }
+        first = std::min(first, abscissa[i]);
+        most = std::max(most, data.crack_length[i]);
+        if (data.crack_length[i] > longest * (1 + rounding)) {
+            beyond = std::min(beyond, abscissa[i]);
+        }
+    }
+    if (beyond == unbounded) {
+        return;
+    }
+    const std::string stop_text = fmt::format("{:g} mm", 1e3 * longest);
+    if (beyond <= first) {
+        throw InputError(
+            file_of(test), "stop.crack_length", stop_text,
+            fmt::format("ends each run before the data begin, whose crack is longer from the first row on, up to {:g} mm",
+                        1e3 * most));
+    }
+    for (std::size_t i = 0; i < abscissa.size(); ++i) {
+        data.crack_length[i] = data.crack_length[i] > longest ? longest : data.crack_length[i];  // NaN stays
+        if (abscissa[i] >= beyond && !data.force.empty()) {
+            data.force[i] = std::nan("");
+        }
+    }
+    covered.remark += fmt::format(
+        "{}{}: stop.crack_length = {} ends the runs before the data, whose crack grows to {:.4g} mm: of rows from {:.4g} "
+        "{} on counts that it is that long; a later stop would take them in.",
+        covered.remark.empty() ? "" : " ", test.name, stop_text, 1e3 * most, (by_time ? 1.0 : 1e3) * beyond,
+        by_time ? "s" : "mm");
+}
+
 }  // namespace
 
 CoveredData covered_data(const Study& study, std::size_t experiment) {
@@ -93,8 +139,16 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     const bool by_time = !is_measured(data.displacement);
     const std::vector<double>& abscissa = by_time ? data.time : data.displacement;
     const RunEnd end = end_of_runs(test.scene, by_time);
-    if (!is_measured(abscissa) || end.at == unbounded) {
-        return {data, ""};
+    CoveredData covered{data, ""};
+    if (!is_measured(abscissa)) {
+        return covered;
+    }
+    const auto with_crack_cut = [&] {
+        cut_at_crack_length(test, abscissa, by_time, covered);
+        return covered;
+    };
+    if (end.at == unbounded) {
+        return with_crack_cut();
     }
     const Range compliance = range_of(study, experiment, &Machine::compliance);
     const Range force_offset = range_of(study, experiment, &Machine::force_offset);
@@ -117,17 +171,17 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     const double stop = end.key == "stop.time" ? *test.scene.stop.time : 1e3 * *test.scene.stop.displacement;
     const std::string stop_text = fmt::format("{:g} {}", stop, end.key == "stop.time" ? "s" : "mm");
     if (beyond <= first) {
-        const std::string file = test.scene.file.empty() ? "scene of " + test.name : test.scene.file.string();
         throw InputError(
-            file, end.key, stop_text,
+            file_of(test), end.key, stop_text,
             fmt::format("ends each run before the data begin, which go from {:g} to {:g} {}", units * first, units * last, unit));
     }
     if (beyond == unbounded) {
-        return {data, ""};
+        return with_crack_cut();
     }
-    CoveredData covered{data, fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} "
-                                          "on are left out; a later stop would take them in.",
-                                          test.name, end.key, stop_text, units * last, unit, units * beyond, unit)};
+    covered.remark =
+        fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} on are left "
+                    "out; a later stop would take them in.",
+                    test.name, end.key, stop_text, units * last, unit, units * beyond, unit);
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (abscissa[i] >= beyond) {
             for (std::vector<double> Curves::*column :
@@ -138,7 +192,7 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
             }
         }
     }
-    return covered;
+    return with_crack_cut();
 }
 
 }  // namespace crampfit

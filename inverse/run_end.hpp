@@ -15,8 +15,9 @@ struct CoveredData {
 
 /// The rows of an experiment's data up to where the scene's stop by displacement or time ends each run, whatever the parameters:
 /// with the machine's numbers that are fitted anywhere in their bounds, and a compliance by the measured force. What follows a
-/// run that ends there is unknown; one that ends earlier, as the specimen splits or the crack is as long as it shall be, goes on
-/// as Comparison has it. Throws InputError, naming the stop, where no row is left.
+/// run that ends there is unknown. From where the measured crack is as long as `stop.crack_length` only that counts. A run that
+/// ends earlier, as the specimen splits or its crack is that long, goes on as Comparison has it. Throws InputError, naming the
+/// stop, where no row is left.
 CoveredData covered_data(const Study& study, std::size_t experiment);
 
 }  // namespace crampfit

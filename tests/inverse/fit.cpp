@@ -111,6 +111,38 @@ TEST(SystemFit, DataBeyondTheEndOfTheRunsAreLeftOut) {
     }
 }
 
+// The data go on beyond the crack length that ends the runs, which in the fake test is reached while forces fall.
+TEST(SystemFit, DataOfALongerCrackThanRunsGoToDoNotBias) {
+    FakeWedge wedge;
+    wedge.sharpness = 1;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    const std::vector<double>& lengths = study.experiments[0].data.crack_length;
+    const double longest = std::midpoint(lengths.front(), *std::max_element(lengths.begin(), lengths.end()));
+    study.experiments[0].scene.file = "wedge.toml";
+    study.experiments[0].scene.stop.crack_length = longest;
+    FitOptions options = with(wedge);
+    options.forward = [run = options.forward, longest](const Scene& scene, const std::atomic<bool>* stop) {
+        Record record = run(scene, stop);
+        const auto end = std::ranges::find_if(record.series, [&](const Instant& row) { return row.crack_length >= longest; });
+        if (end != record.series.end()) {
+            end->crack_length = longest;
+            record.series.erase(end + 1, record.series.end());
+        }
+        return record;
+    };
+    const Fit fit = fit_study(study, options);
+    EXPECT_EQ(fit.status, FitStatus::converged);
+    EXPECT_EQ(fit.message.find("Lack of fit"), std::string::npos) << fit.message;
+    EXPECT_NE(fit.message.find("wedge: stop.crack_length = "), std::string::npos) << fit.message;
+    for (const FittedParameter& parameter : fit.parameters) {
+        const double truth = &parameter == &fit.parameters[0] ? true_earlywood : true_latewood;
+        EXPECT_LT(std::abs(parameter.value - truth), 3 * parameter.standard_error) << parameter.name;
+        EXPECT_LT(parameter.standard_error, 0.05 * truth) << parameter.name;
+    }
+    study.experiments[0].scene.stop.crack_length = 0.5 * lengths.front();
+    EXPECT_THROW(fit_study(study, options), InputError);
+}
+
 TEST(SystemFit, WhatTheMachineTakesOfTheDisplacementDoesNotEndTheRunsEarlier) {
     FakeWedge wedge;
     Study study = wedge_study(wedge, 0.02, 1e-4);
