@@ -130,6 +130,19 @@ void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSol
                         *at);
 }
 
+// Says so where an advance is so short that what it releases is the grid's say: it may pin a crack for good.
+void judge_advance(const Scene& scene, const Discretisation& body, Record& record) {
+    constexpr double short_in_cells = 0.2;
+    for (const Crack& crack : scene.cracks)
+        if (crack.grows != Growth::none && crack.advance > 0.0 && crack.advance < short_in_cells * body.layout.cell.minCoeff()) {
+            record.message +=
+                fmt::format("; advance = {:.3g} mm is short for cells of {:.3g} mm: the grid may hold the crack up, see "
+                            "crampfit explain",
+                            1e3 * crack.advance, 1e3 * body.layout.cell.minCoeff());
+            return;
+        }
+}
+
 // A crack that goes out through a side is shown to end there: solvers let its tip go on a little.
 void end_at_sides(const Scene& scene, Record& record) {
     const Box box{Vec2::Zero(), scene.specimen.size};
@@ -246,6 +259,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, options, record);
     read_probes(scene, walk, record);
     if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, body, walk, record);
+    judge_advance(scene, body, record);
     return record;
 }
 

@@ -1,4 +1,5 @@
 // Rigid bodies against the specimen's outline at equilibrium: Hertz, plates, statics of a wedge, and how smooth a wheel rolls.
+#include "datasets/error.hpp"
 #include "forward/equilibrium.hpp"
 #include "tests/forward/scenes.hpp"
 
@@ -256,6 +257,35 @@ TEST(VerificationPlates, AConstantLoadPressesABlock) {
     EXPECT_EQ(by_traction.status, RunStatus::finished) << by_traction.message;
     const double push = wood.poisson_ratio * pressure * 10e-3 * scene.model.thickness;
     EXPECT_NEAR(by_traction.reactions.back().force.back().norm() / push, 1, 0.015);
+}
+
+// Nothing but rollers holds a beam in three-point bending: the one above at a point, two below without friction, which press only
+// once it has begun to move. F = 48 E I u / L^3, 1 + 2.4 (1 + nu) (h / L)^2 times as soft by shear (Timoshenko), and a little by
+// the dents.
+TEST(VerificationPlates, RollersAloneHoldABeam) {
+    Scene scene = block({60e-3, 10e-3}, 1e-3);
+    scene.model.plane = PlaneCondition::stress;
+    scene.edges.clear();
+    scene.bodies = {sliding("load", Circle{Vec2(30e-3, 13e-3), 3e-3}, {0.0, -1e-6}),
+                    sliding("left", Circle{Vec2(5e-3, -3e-3), 3e-3}, {0.0, 0.0}),
+                    sliding("right", Circle{Vec2(55e-3, -3e-3), 3e-3}, {0.0, 0.0})};
+    scene.bodies[0].contact.kind = Contact::Kind::bonded;
+    scene.measure = {"load", "load"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.stop.displacement = 0.5e-3;
+    const Record record = simulate(scene);
+    ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+    const double force = record.series.back().force;
+    for (const std::size_t support : {1u, 2u}) EXPECT_NEAR(record.reactions[support].force.back().y() / force, 0.5, 1e-3);
+    const Material& wood = scene.materials.at("EW");
+    const double inertia = scene.model.thickness * std::pow(10e-3, 3) / 12, span = 50e-3;
+    const double softer = 1 + 2.4 * (1 + wood.poisson_ratio) * std::pow(10e-3 / span, 2);
+    const double beam = 48 * wood.youngs_modulus * inertia * 0.5e-3 / std::pow(span, 3) / softer;
+    std::printf("beam on rollers: %.3f of the force of a beam\n", force / beam);
+    EXPECT_NEAR(force / beam, 0.97, 0.04);
+    for (Body& roller : scene.bodies)
+        if (roller.name != "load") std::get<Circle>(roller.shape).centre.y() -= 5e-3;
+    EXPECT_THROW(simulate(scene), InputError);  // there is nothing that it could go to
 }
 
 // Checks F_H = F_V / (2 tan(A / 2)), without friction (REFERENCES), and returns how far off it is.
