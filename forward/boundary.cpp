@@ -64,20 +64,20 @@ Gauges::Gauges(const Scene& scene) {
         if (driver >= edges) {
             if (driver - edges < static_cast<int>(scene.bodies.size())) {
                 const Body& body = scene.bodies[driver - edges];
-                drive = body.velocity.isZero() ? body.force : body.velocity;
+                drive = body.velocity.isZero(0.0) ? body.force : body.velocity;
             }
         } else if (scene.edges[driver].traction) {
             drive = *scene.edges[driver].traction;
         } else {
             drive = {scene.edges[driver].velocity[0].value_or(0.0), scene.edges[driver].velocity[1].value_or(0.0)};
         }
-        return drive.isZero() ? drive : Vec2(drive.normalized());
+        return drive.isZero(0.0) ? drive : Vec2(drive.normalized());
     };
     displacement = driver_named(scene.measure.displacement);
     displacement_direction = direction_of(displacement);
     force = driver_named(scene.measure.force);
     force_direction = direction_of(force);
-    if (force_direction.isZero()) force_direction = -displacement_direction;  // a fixed support feels the opposite of the load
+    if (force_direction.isZero(0.0)) force_direction = -displacement_direction;  // a fixed support feels the opposite of the load
 }
 
 std::vector<double> field_masses(const Discretisation& body, int fields) {
@@ -289,7 +289,7 @@ Vec2 Boundary::velocity_of(int driver) const {
 Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
 
 bool Boundary::has_dead_load() const {
-    const auto is_loaded = [](const Body& rigid) { return !rigid.force.isZero(); };
+    const auto is_loaded = [](const Body& rigid) { return !rigid.force.isZero(0.0); };
     return !tractions.empty() || std::any_of(scene_.bodies.begin(), scene_.bodies.end(), is_loaded);
 }
 

@@ -37,7 +37,7 @@ std::vector<FacePiece> face_pieces(const CrackFields& cracks, int crack, bool at
     std::vector<FacePiece> pieces;
     for (std::size_t k = 0; k < forces.size(); ++k) {
         const FieldPair& pair = cracks.pairs[k];
-        if (pair.crack != crack || forces[k].isZero()) continue;
+        if (pair.crack != crack || forces[k].isZero(0.0)) continue;
         const double behind = distance_behind(line, at_end, layout.node_position(pair.node));
         const double near = std::max(0.0, behind - 0.5 * width), far = behind + 0.5 * width;
         if (far <= near) continue;

@@ -10,6 +10,8 @@
 #include <fstream>
 #include <iostream>
 #include <mutex>
+#include <sstream>
+#include <string>
 #include <string_view>
 
 namespace crampfit {
@@ -78,6 +80,27 @@ bool is_cut_short(const std::vector<std::uint8_t>& bytes) {
     return text.starts_with("\x89PNG") && text.rfind("IEND") == text.npos;
 }
 
+/// What white is in a PGM or PPM, which cameras of 10 and 12 bits write: the third number of the header, comments aside; 0: it is
+/// none. The library takes numbers beyond 255 as they are.
+int white_of_netpbm(const std::vector<std::uint8_t>& bytes) {
+    constexpr std::size_t longest_header = 4096;
+    const std::string text(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bytes.size(), longest_header)));
+    std::istringstream header(text);
+    std::string word;
+    header >> word;
+    if (word != "P2" && word != "P3" && word != "P5" && word != "P6") {
+        return 0;
+    }
+    int number = 0;
+    for (int k = 0; k < 3; ++k) {
+        while ((header >> std::ws).peek() == '#') {
+            std::getline(header, word);
+        }
+        header >> number;
+    }
+    return header ? number : 0;
+}
+
 std::vector<std::uint8_t> read_bytes(const std::filesystem::path& file, const PictureKey& asked_by) {
     const auto fail = [&](const char* rule) { throw InputError(asked_by.file, asked_by.key, file.string(), rule); };
     std::error_code error;
@@ -127,6 +150,9 @@ cv::Mat read_pixels(const std::filesystem::path& file, const PictureKey& asked_b
         }
         if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
             fail("must be a picture of 8 or 16 bits a channel");
+        }
+        if (const int white = white_of_netpbm(bytes); white > 0 && picture.depth() == CV_16U) {
+            picture *= 65535.0 / white;
         }
         return picture;
     } catch (const cv::Exception&) {

@@ -1,4 +1,5 @@
 // Pictures to classes. References are worked out by hand from the rule that a test names.
+#include "imaging/gray_picture.hpp"
 #include "imaging/picture.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -118,6 +119,17 @@ TEST(UnitPicture, SixteenBitIsDividedBy257AndRounded) {
             EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC1, cv::Scalar(value)), name, gray), "exact") << value << name;
     EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC3, cv::Scalar(50 * 257, 100 * 257, 200 * 257)), "a.png", 124), "exact");
     EXPECT_EQ(class_of_one_pixel(cv::Mat(1, 1, CV_16UC4, cv::Scalar(12850, 25700, 51400, 9)), "a.png", 124), "exact");
+}
+
+TEST(UnitPicture, WhiteOfAPgmIsWhatItsHeaderSays) {
+    // As cameras of 12 bits write it: 124 / 255 of 4095 is 1991.3, of 65535 it is 31868.
+    const TemporaryFolder folder;
+    const auto gray_of = [&](const std::string& header, int value) {
+        const std::string pixel{static_cast<char>(value / 256), static_cast<char>(value % 256)};
+        return int{read_gray(folder.write("camera.pgm", header + pixel), {"test", "picture"}).gray.at(0)};
+    };
+    EXPECT_EQ(gray_of("P5\n# a camera's\n1 1\n4095\n", 1991), 124);
+    EXPECT_EQ(gray_of("P5 1 1 65535\n", 31868), 124);
 }
 
 TEST(UnitPicture, PaletteBmp) {
