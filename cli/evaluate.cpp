@@ -82,7 +82,7 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
     Eigen::VectorXd values = evaluation.residuals;
     const bool misfit = !of_outputs && request.active.size() == 1;
     if (!misfit && static_cast<std::size_t>(values.size()) != request.active.size())
-        throw InputError("study", of_outputs ? "outputs" : "residuals", std::to_string(values.size()),
+        throw InputError(study.file.string(), of_outputs ? "outputs" : "residuals", std::to_string(values.size()),
                          fmt::format("must be as many as the functions that are asked for, which are {}{}", request.active.size(),
                                      of_outputs ? "" : "; or ask for one, the sum of their squares"));
     Eigen::MatrixXd slopes;  // [functions x parameters]

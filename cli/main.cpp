@@ -51,7 +51,13 @@ ExitStatus fail(ExitStatus status, const std::string& message) {
 
 /// `--help` and `--version` end the reading as well, with success.
 ExitStatus end_of_reading(const CLI::App& command, const CLI::ParseError& end) {
-    if (end.get_exit_code() != 0) return fail(ExitStatus::bad_input, fmt::format("{} (see crampfit --help)", end.what()));
+    if (end.get_exit_code() != 0) {
+        const std::vector<std::string> unknown = command.remaining();
+        const bool no_verb = command.get_subcommands().empty() && !unknown.empty();
+        return fail(ExitStatus::bad_input,
+                    fmt::format("{} (see crampfit --help)",
+                                no_verb ? fmt::format("there is no verb \"{}\"", unknown.front()) : std::string(end.what())));
+    }
     command.exit(end);
     return ExitStatus::done;
 }

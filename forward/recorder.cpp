@@ -170,7 +170,7 @@ void Recorder::save_row() {
         history.K_II.push_back(load.K_II);
     }
     const EnergyBooks books = solver_.energies();
-    row.strain_energy = books.strain;
+    row.strain_energy = books.strain + books.contact;  // what comes back, as at equilibrium
     row.kinetic_energy = books.kinetic;
     row.fracture_energy = books.fracture;
     row.external_work = books.work;

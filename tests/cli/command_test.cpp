@@ -55,6 +55,7 @@ TEST(SystemCommand, BadUsageIsStatusTwo) {
         EXPECT_EQ(outcome.out, "");
     }
     EXPECT_FALSE(std::filesystem::exists(record));
+    EXPECT_NE(command.run({"--threads", "2", "paint"}).error.find("there is no verb \"paint\""), std::string::npos);
 }
 
 TEST(SystemCommand, SimulateSavesARecord) {

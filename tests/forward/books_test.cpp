@@ -78,6 +78,24 @@ TEST(VerificationBooks, CloseAcrossAClosedCrackForEachVelocityUpdate) {
     }
 }
 
+// A plate pressed slowly on a block: what its work has become is in the columns, contact's springs included.
+TEST(VerificationBooks, ColumnsHoldTheWorkOfAPressingBody) {
+    Scene scene = block({10e-3, 10e-3}, 1e-3);
+    scene.edges = {without(moving("bottom", Side::bottom, {0.0, 0.0}), 0)};
+    Body plate;
+    plate.name = "plate";
+    plate.shape = Polygon{{Vec2(-2e-3, 10e-3), Vec2(12e-3, 10e-3), Vec2(12e-3, 12e-3), Vec2(-2e-3, 12e-3)}};
+    plate.velocity = {0.0, -0.05};
+    scene.bodies = {plate};
+    scene.measure = {"plate", "plate"};
+    scene.stop.displacement = 0.1e-3;
+    const Record record = simulate(at_motion(scene));
+    const Instant& end = record.series.back();
+    std::printf("plate on a block: %.4f of the work in the columns\n",
+                (end.strain_energy + end.kinetic_energy + end.fracture_energy) / end.external_work);
+    EXPECT_NEAR((end.strain_energy + end.kinetic_energy + end.fracture_energy) / end.external_work, 1.0, closed);
+}
+
 // Two cracks that start in a hole and leave the specimen: the tips take up the toughness times their way.
 TEST(VerificationBooks, CracksOutOfAHolePayForTheirWay) {
     Scene scene = block({10e-3, 10e-3}, 0.25e-3);
