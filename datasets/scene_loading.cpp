@@ -197,10 +197,33 @@ Crack read_crack(const Entry& entry, const Vec2& specimen_size) {
 
 }  // namespace
 
+// Two edges may meet at a place, and share a stretch that they move alike.
+void check_agrees(const Edge& edge, const Entry& entry, const std::vector<Edge>& before) {
+    const auto stretch = [](const Edge& e) { return e.range.value_or(std::pair{0.0, std::numeric_limits<double>::infinity()}); };
+    for (const Edge& other : before) {
+        const auto [low, high] = stretch(edge);
+        const auto [other_low, other_high] = stretch(other);
+        if (other.side != edge.side || std::min(high, other_high) <= std::max(low, other_low)) {
+            continue;
+        }
+        for (const std::size_t axis : {0u, 1u}) {
+            const auto &here = edge.velocity[axis], &there = other.velocity[axis];
+            if (here && there && (*here != *there || (*here != 0.0 && edge.until != other.until))) {
+                entry.fail(
+                    fmt::format("moves its {} otherwise than edge \"{}\", which holds a stretch of it too: give each its own "
+                                "range",
+                                axis == 0 ? "x" : "y", other.name));
+            }
+        }
+    }
+}
+
 std::vector<Edge> read_edges(const Entry& edges, const Vec2& specimen_size) {
     std::vector<Edge> result;
     for (const Entry& edge : edges.list()) {
-        result.push_back(read_edge(edge, specimen_size));
+        const Edge read = read_edge(edge, specimen_size);
+        check_agrees(read, edge, result);
+        result.push_back(read);
     }
     return result;
 }

@@ -462,6 +462,8 @@ TEST(UnitScene, KeysThatDoNotGoTogether) {
         {ring_scene, "side = \"left\"", "name = \"grip\"\nside = \"left\"", "edges.grip.name", "is taken"},
         {ring_scene, "name = \"left wheel\"", "name = \"grip\"", "bodies.grip.name", "is taken"},
         {plain_scene, "side = \"top\"", "side = \"bottom\"", "edges.bottom", "is taken"},
+        {picture_scene, "side = \"top\"", "name = \"half\"\nside = \"bottom\"\nrange = [\"0 mm\", \"1 mm\"]", "edges.half",
+         "moves its y otherwise than edge \"bottom\""},
     });
     const SceneFolder folder;
     expect_error((folder / "scene.toml").string(), "measure.force", "nothing loads the specimen", [&] {
