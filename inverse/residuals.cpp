@@ -328,7 +328,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
     const double shortest = rows.mean(from, from + arrival_window_);
     // A test may end with a jump, which its last row alone has seen.
     double longest = std::max(rows.mean(to - arrival_window_, to), rows.y().back() - 3 * noise);
-    if (longest_) {  // beside where rows are cut off their noise has one side only
+    if (longest_ && rows.y().back() >= *longest_) {  // beside where rows are cut off their noise has one side only
         longest = std::min(longest, *longest_ - 2 * noise);
     }
     const double growth = longest - shortest;

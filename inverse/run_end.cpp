@@ -8,14 +8,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 namespace crampfit {
 namespace {
 
 constexpr double rounding = 1e-9;  // of where a run ends
+constexpr double clearly = 3.0;    // sigmas
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
 /// Where runs end at the latest, and by which key of the scene.
@@ -97,22 +101,35 @@ void cut_at_crack_length(const Experiment& test, const std::vector<double>& absc
         return;
     }
     const double longest = *test.scene.stop.crack_length;
-    double first = unbounded, beyond = unbounded, most = 0;
+    std::vector<std::pair<double, double>> rows;  // abscissa, crack length
+    double most = 0;
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
-        if (std::isnan(abscissa[i]) || std::isnan(data.crack_length[i])) {
-            continue;
-        }
-        first = std::min(first, abscissa[i]);
-        most = std::max(most, data.crack_length[i]);
-        if (data.crack_length[i] > longest * (1 + rounding)) {
-            beyond = std::min(beyond, abscissa[i]);
+        if (!std::isnan(abscissa[i]) && !std::isnan(data.crack_length[i])) {
+            rows.emplace_back(abscissa[i], data.crack_length[i]);
+            most = std::max(most, data.crack_length[i]);
         }
     }
-    if (beyond == unbounded) {
+    if (most <= longest + clearly * test.noise.crack_length.value_or(0.0)) {
         return;
     }
+    // It has come there at the row with the fewest others on the wrong side: noise and slips of single rows do not count.
+    std::sort(rows.begin(), rows.end());
+    const auto is_longer = [&](const auto& row) { return row.second > longest; };
+    std::ptrdiff_t wrong = std::count_if(rows.begin(), rows.end(), std::not_fn(is_longer)), fewest = wrong;
+    auto there = rows.begin();
+    for (auto row = rows.begin(); row != rows.end(); ++row) {
+        wrong += is_longer(*row) ? 1 : -1;
+        if (wrong < fewest) {
+            fewest = wrong;
+            there = row + 1;
+        }
+    }
+    if (there == rows.end()) {
+        return;
+    }
+    const double beyond = there->first;
     const std::string stop_text = fmt::format("{:g} mm", 1e3 * longest);
-    if (beyond <= first) {
+    if (there == rows.begin()) {
         throw InputError(
             file_of(test), "stop.crack_length", stop_text,
             fmt::format("ends each run before the data begin, whose crack is longer from the first row on, up to {:g} mm",
