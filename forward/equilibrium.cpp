@@ -40,6 +40,7 @@ constexpr int sorting = 6;       // iterations without an end after which faces 
 constexpr int most_trials = 12;  // of a part of a Newton step
 
 // Stiffness, of the wood's times the thickness, with which a specimen that bodies do not hold yet is kept from going far.
+// Equilibrium does not hang on it: it is in no force.
 constexpr double loose_stiffness = 0.01;
 
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
@@ -564,7 +565,7 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
                     ? residual > worth_keeping_with_friction * before
                     : residual >= before || std::log(residual / (balance * scale)) > worth_keeping * std::log(before / residual);
     }
-    return hinges_.empty() ? Outcome::not_converged : Outcome::mechanism;
+    return hinges_.empty() && !loose_ ? Outcome::not_converged : Outcome::mechanism;
 }
 
 void Equilibrium::refine() {

@@ -48,7 +48,7 @@ double force_at_displacement(const Record& record, double displacement) {
     return std::nan("");
 }
 
-// ---- the highest load between two places
+// ---- when a crack moves on from a place
 
 // What is known of a place hangs on the way to it; when its crack moves does not.
 TEST(UnitStation, WhenACrackMovesDoesNotHangOnWhatElseIsKnown) {
@@ -68,6 +68,8 @@ TEST(UnitStation, WhenACrackMovesDoesNotHangOnWhatElseIsKnown) {
     station.states[5] = state(5.0, 500.0);
     EXPECT_NEAR(station.critical_time(100.0), 4.0 * std::sqrt(100.0 / 225.0), 1e-12);
 }
+
+// ---- the highest load between two places
 
 TEST(UnitLoadPeak, IsExactWhereTheEnergyIsACubic) {
     // Energy released per square of the load 2 + (x - 0.3)^2 + (x - 0.3)^3 / 2, toughness 8 J/m^2: least at x = 0.3, the load 2

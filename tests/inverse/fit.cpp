@@ -111,7 +111,7 @@ TEST(SystemFit, DataBeyondTheEndOfTheRunsAreLeftOut) {
     }
 }
 
-// The data go on beyond the crack length that ends the runs, which in the fake test is reached while forces fall.
+// The data go on beyond the crack length that ends the runs.
 TEST(SystemFit, DataOfALongerCrackThanRunsGoToDoNotBias) {
     FakeWedge wedge;
     wedge.sharpness = 1;
