@@ -86,6 +86,15 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
     for (int p = 0; p < points.count(); ++p)
         for (int k = 0; k < body.layout.nodes_per_cell(); ++k)
             mass[points.node[p][k]] += points.mass[p] * body.weights[points.slot[p]].value[k];
+    for (const Sliver& sliver : body.slivers) {
+        const int p = sliver.point;
+        const auto own = body.values_at(points.cell[p], sliver.position);
+        const auto rest = body.values_at(points.cell[p], sliver.middle_of_rest(points.position[p]));
+        for (int k = 0; k < 4; ++k) {
+            mass[points.node[p][k]] += points.mass[p] * ((1.0 - sliver.share) * rest[k] - body.weights[points.slot[p]].value[k]);
+            mass[sliver.node[k]] += points.mass[p] * sliver.share * own[k];
+        }
+    }
     return mass;
 }
 
@@ -210,6 +219,10 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
             if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
             const Box domain = body_.domain(p);
             found |= on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high);
+        }
+        for (const Sliver& sliver : body_.slivers_of(c, c + 1)) {
+            if (std::ranges::find(sliver.node, field) == sliver.node.end()) continue;
+            found |= on_side(body_.layout, edge.side, sliver.low) || on_side(body_.layout, edge.side, sliver.high);
         }
     });
     return found;

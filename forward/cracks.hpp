@@ -89,7 +89,9 @@ class CrackFields {
   public:
     /// A pair appears once the tip has gone `least_freed` of that way, or just before for a negative number. `tie` never
     /// becomes stiffer than it is at that share, if that is above 0.
-    CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed);
+    /// With `cuts_domains` the points' domains are cut as the only crack goes (`Sliver`).
+    CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed,
+                bool cuts_domains = false);
 
     struct NewField {
         int field;
@@ -143,6 +145,11 @@ class CrackFields {
     double freed(int crack, int node) const;
     bool is_inside(const Vec2& x) const;
     void sort_points(int crack, const Box& window);
+    void cut_domains(const Box& window);
+    std::array<Vec2, 2> stretched(std::size_t piece) const;
+    bool goes_to(const Box& box) const;
+    bool lies_at_a_kink(const Vec2& x) const;
+    std::optional<Sliver> cut_off(int point, const std::vector<bool>& is_parted);
     int field(int node, unsigned mask, int crack);
     void add_pairs(int node, unsigned mask);
     void renew_sides(int crack);
@@ -153,6 +160,7 @@ class CrackFields {
     Discretisation* body_;
     const MaterialMap* materials_;
     double least_freed_;
+    bool cuts_domains_;
     PointTable<std::uint8_t> mask_;                     // [points] bit k: crack k lies between the point and the cell's node
     std::map<std::pair<int, unsigned>, int> field_of_;  // node and mask to field, for masks above 0
     std::vector<NewField> new_fields_;

@@ -43,19 +43,23 @@ std::vector<Vec2> part_about(const std::vector<Vec2>& points, const Box& box) {
 
 }  // namespace
 
-int GridView::point_about(const Vec2& x) const {
+std::optional<GridView::Wood> GridView::wood_about(const Vec2& x) const {
     const int found = body.point_at(x);
-    if (found < 0) return -1;
+    if (found < 0) return std::nullopt;
     const Vec2& at = body.points.position[found];
     const bool is_same = (at - x).squaredNorm() <= 1e-18 * body.layout.cell.squaredNorm();
-    return is_same || cracks.is_left(crack, at) == cracks.is_left(crack, x) ? found : -1;
+    if (is_same || cracks.is_left(crack, at) == cracks.is_left(crack, x))
+        return Wood{body.points.cell[found], body.points.node[found]};
+    const auto sliver = std::ranges::lower_bound(body.slivers, found, {}, &Sliver::point);
+    if (sliver == body.slivers.end() || sliver->point != found) return std::nullopt;
+    return Wood{body.points.cell[found], sliver->node};
 }
 
-std::vector<int> GridView::points_beside(const Vec2& x, const Vec2& node) const {
+std::vector<GridView::Wood> GridView::wood_beside(const Vec2& x, const Vec2& node) const {
     constexpr double more_than_any_distance = 1e3;  // what a cell is off the node counts before what a point is off x
     const bool left = cracks.is_left(crack, x);
     const double as_near = 1e-6 * body.layout.cell.minCoeff();
-    std::vector<int> nearest;
+    std::vector<Wood> nearest;
     double least = INFINITY;
     body.for_cells_near(x, body.layout.cell.maxCoeff(), [&](int c) {
         const Vec2 low = body.layout.cell_corner(c), high = low + body.layout.cell;
@@ -65,7 +69,7 @@ std::vector<int> GridView::points_beside(const Vec2& x, const Vec2& node) const 
             if (distance > least + as_near || cracks.is_left(crack, body.points.position[p]) != left) continue;
             if (distance < least - as_near) nearest.clear();
             least = std::min(least, distance);
-            nearest.push_back(p);
+            nearest.push_back({c, body.points.node[p]});
         }
     });
     return nearest;
@@ -164,30 +168,38 @@ bool CutOut::take_over(const GridView& from, bool solved_there) {
             if (i >= 0 && j >= 0 && i <= layout.cells_x && j <= layout.cells_y) say_the_same[layout.node_index(i, j)] = false;
         }
     }
-    const auto take = [&](auto&& find_points) {
-        for (int p = 0; p < cracked_.points.count(); ++p) {
-            for (const int field : cracked_.points.node[p].first(nodes)) {
+    const auto for_wood = [&](const auto& visit) {
+        for (int p = 0; p < cracked_.points.count(); ++p)
+            visit(cracked_.points.position[p], std::as_const(cracked_.points).node[p]);
+        for (const Sliver& sliver : cracked_.slivers) visit(sliver.position, sliver.node);
+    };
+    const auto take = [&](auto&& find_wood) {
+        for_wood([&](const Vec2& at, std::span<const int> fields) {
+            for (const int field : fields.first(nodes)) {
                 if (!unknown[field] || (say_the_same[field] && count[field] > 0)) continue;
                 const Vec2 x = layout.node_position(cracks.node_of_field[field]) + shift;
-                for (const int other : find_points(p, x)) {
-                    holds.push_back({field, {}, from.body.values_at(from.body.points.cell[other], x)});
-                    std::copy_n(from.body.points.node[other].begin(), nodes, holds.back().from.begin());
+                for (const GridView::Wood& other : find_wood(at, x)) {
+                    holds.push_back({field, {}, from.body.values_at(other.cell, x)});
+                    std::copy_n(other.fields.begin(), nodes, holds.back().from.begin());
                     ++count[field];
                 }
             }
-        }
+        });
         for (int field = 0; field < cracks.fields(); ++field) unknown[field] = unknown[field] && count[field] == 0;
     };
-    take([&, last = -1, about = std::vector<int>{}](int p, const Vec2&) mutable -> const std::vector<int>& {
-        if (std::exchange(last, p) == p) return about;
+    take([&, last = Vec2(INFINITY, INFINITY),
+          about = std::vector<GridView::Wood>{}](const Vec2& at, const Vec2&) mutable -> const std::vector<GridView::Wood>& {
+        if (std::exchange(last, at) == at) return about;
         about.clear();
-        if (const int found = from.point_about(cracked_.points.position[p] + shift); found >= 0) about.push_back(found);
+        if (const auto found = from.wood_about(at + shift)) about.push_back(*found);
         return about;
     });
-    take([&](int p, const Vec2& x) { return from.points_beside(cracked_.points.position[p] + shift, x); });
-    for (int p = 0; p < cracked_.points.count(); ++p)
-        for (const int field : cracked_.points.node[p].first(nodes))
-            if (unknown[field]) return false;
+    take([&](const Vec2& at, const Vec2& x) { return from.wood_beside(at + shift, x); });
+    bool all_known = true;
+    for_wood([&](const Vec2&, std::span<const int> fields) {
+        for (const int field : fields.first(nodes)) all_known = all_known && !unknown[field];
+    });
+    if (!all_known) return false;
     std::vector<Vec2> displacement(cracks.fields(), Vec2::Zero());
     for (Hold& hold : holds) {
         for (int k = 0; k < nodes; ++k) {

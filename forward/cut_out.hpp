@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace crampfit {
@@ -16,12 +17,18 @@ struct GridView {
     Vec2 origin;  // of its lower left corner in the specimen [m]
     int crack;    // its number there
 
-    /// The point whose wood a place lies in, if it is on the same side of the crack; -1: none.
-    int point_about(const Vec2& x) const;
+    /// What of the wood moves together, by its cell and the fields there.
+    struct Wood {
+        int cell;
+        std::span<const int> fields;
+    };
 
-    /// The points nearest to a place on the same side of the crack, those first whose cell holds a node or is nearest to it. More
-    /// than one where they are as near, none where none is.
-    std::vector<int> points_beside(const Vec2& x, const Vec2& node) const;
+    /// That in which a place lies, if it is on the same side of the crack.
+    std::optional<Wood> wood_about(const Vec2& x) const;
+
+    /// That of the points nearest to a place on the same side of the crack, those first whose cell holds a node or is nearest to
+    /// it. More than one where they are as near, none where none is.
+    std::vector<Wood> wood_beside(const Vec2& x, const Vec2& node) const;
 };
 
 /// The wood of a box of the specimen in cells of its own, without a crack: found once for all cracks there.

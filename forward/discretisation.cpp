@@ -162,6 +162,19 @@ std::array<double, most_nodes> Discretisation::values_at(int c, const Vec2& x) c
     return cell_weights(ShapeFunction::bspline2, place, layout.cell, {}, ends).value;
 }
 
+std::array<Vec2, 4> Discretisation::slopes_at(int c, const Vec2& x) const {
+    const Vec2& cell = layout.cell;
+    const Vec2 r = (x - layout.cell_corner(c)).cwiseQuotient(cell);
+    return {Vec2((r.y() - 1.0) / cell.x(), (r.x() - 1.0) / cell.y()), Vec2((1.0 - r.y()) / cell.x(), -r.x() / cell.y()),
+            Vec2(-r.y() / cell.x(), (1.0 - r.x()) / cell.y()), Vec2(r.y() / cell.x(), r.x() / cell.y())};
+}
+
+std::span<const Sliver> Discretisation::slivers_of(int first, int last) const {
+    const auto from = std::ranges::lower_bound(slivers, points.first_of_cell[first], {}, &Sliver::point);
+    const auto to = std::ranges::lower_bound(from, slivers.end(), points.first_of_cell[last], {}, &Sliver::point);
+    return {from, to};
+}
+
 void Discretisation::mark_changes() {
     points.changes.assign(points.count(), Change::none);
     for (int p = 0; p < points.count(); ++p) {
@@ -289,7 +302,7 @@ bool Discretisation::cell_is_whole(int c) const {
     const int first = points.first_of_cell[c];
     for (int p = first + 1; p < points.first_of_cell[c + 1]; ++p)
         if (!points.node.same(p, first)) return false;
-    return true;
+    return slivers_of(c, c + 1).empty();
 }
 
 const Unevenness* Discretisation::unevenness_of_whole(int c) const {

@@ -125,6 +125,22 @@ struct Points {
     double stiffest(int p) const { return std::max(stiffness[cell[p]][0], stiffness[cell[p]][2]); }  // of both axes [Pa]
 };
 
+/// What a crack cuts off the domain of a point that lies on its other side. It moves with fields of its own, at a place of its
+/// own. The point counts for so much less, and at the middle of what is left.
+struct Sliver {
+    int point;
+    double share;             // of the point's volume
+    Vec2 position;            // its middle, undeformed [m]
+    Vec2 moments;             // second ones about its middle, of x and y, over its area [m^2]
+    Vec2 low, high;           // its bounds [m]
+    std::array<int, 4> node;  // the velocity fields it belongs to at the nodes that the point's cell sees
+
+    /// Of what is left of the point.
+    Vec2 middle_of_rest(const Vec2& middle) const { return (middle - share * position) / (1.0 - share); }
+
+    bool operator==(const Sliver&) const = default;
+};
+
 /// A short piece of the specimen's surface: of its sides, or of a cutout's true outline and not of the staircase of the points.
 /// Together they are as long as the surface. It moves with the cell that it lies in, so that the surface stays in one piece.
 struct Facet {
@@ -153,6 +169,7 @@ class Discretisation {
         int cell;
         Unevenness wood;
     };
+    std::vector<Sliver> slivers;           // by point; at equilibrium only
     std::vector<UnevenCell> uneven_cells;  // full cells of more than one wood, in order; none with B-splines
 
     Box domain(int p) const {  // of a point, whatever cutouts take of it
@@ -164,6 +181,10 @@ class Discretisation {
     int place_of(int p) const { return points.slot[p] % layout.points_per_cell(); }  // in its cell, row by row
     /// Shape functions of the nodes that a cell sees at x, which may lie outside the cell: they go on as they do in it.
     std::array<double, most_nodes> values_at(int c, const Vec2& x) const;
+    /// Slopes of the corners' bilinear functions at x [1/m].
+    std::array<Vec2, 4> slopes_at(int c, const Vec2& x) const;
+    /// The slivers of the points of cells `first` .. `last` - 1.
+    std::span<const Sliver> slivers_of(int first, int last) const;
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     bool cell_is_whole(int c) const;                             // full, and no crack between its points
     const Unevenness* unevenness_of_whole(int c) const;          // null where a cell is cut, or of one wood

@@ -158,7 +158,42 @@ class Extension {
     bool at_end_;
 };
 
-// Calls visit(p, q, gradient of q) for every point that the virtual extension moves or strains.
+// Wood about one place: a point's, what a crack leaves of it, or what it cuts off.
+struct Spot {
+    int point;
+    Vec2 position;
+    double volume;         // [m^3]
+    const Sliver* sliver;  // null: the point as it is
+    bool is_sliver;
+
+    std::span<const int> node(const Discretisation& body) const {
+        return is_sliver ? std::span<const int>(sliver->node) : body.points.node[point];
+    }
+
+    Mat2 gradient(const Discretisation& body, const std::vector<Vec2>& field) const {
+        if (!sliver) return gradient_at(body, point, field);
+        const auto slopes = body.slopes_at(body.points.cell[point], position);
+        const auto fields = node(body);
+        Mat2 sum = Mat2::Zero();
+        for (int k = 0; k < 4; ++k) sum += field[fields[k]] * slopes[k].transpose();
+        return sum;
+    }
+
+    Mat2 seen_gradient(const Discretisation& body, const std::vector<Vec2>& displacement, bool rotates) const {
+        return sliver ? gradient(body, displacement) : seen_gradient_at(body, point, displacement, rotates);
+    }
+
+    Vec2 value(const Discretisation& body, const std::vector<Vec2>& field) const {
+        if (!sliver) return value_at(body, point, field);
+        const auto values = body.values_at(body.points.cell[point], position);
+        const auto fields = node(body);
+        Vec2 sum = Vec2::Zero();
+        for (int k = 0; k < 4; ++k) sum += values[k] * field[fields[k]];
+        return sum;
+    }
+};
+
+// Calls visit(spot, q, gradient of q) for all wood that the virtual extension moves or strains.
 template <class Visit>
 void for_points_in(const Discretisation& body, const Vec2& tip, const Extension& extension, Visit visit) {
     body.for_cells_near(tip, extension.outer, [&](int c) {
@@ -166,7 +201,26 @@ void for_points_in(const Discretisation& body, const Vec2& tip, const Extension&
         std::array<Vec2, 4> q_corner;
         for (int k = 0; k < 4; ++k) q_corner[k] = extension.at(corners[k]);
         if (std::all_of(q_corner.begin(), q_corner.end(), [](const Vec2& q) { return q.isZero(); })) return;
+        const std::span<const Sliver> slivers = body.slivers_of(c, c + 1);
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
+            const auto cut = std::ranges::find(slivers, p, &Sliver::point);
+            if (cut != slivers.end()) {
+                const double volume = body.points.volume[p];
+                for (const Spot& spot :
+                     {Spot{p, cut->middle_of_rest(body.points.position[p]), (1.0 - cut->share) * volume, &*cut, false},
+                      Spot{p, cut->position, cut->share * volume, &*cut, true}}) {
+                    const auto values = body.values_at(c, spot.position);
+                    const auto slopes = body.slopes_at(c, spot.position);
+                    Vec2 q = Vec2::Zero();
+                    Mat2 q_gradient = Mat2::Zero();
+                    for (int k = 0; k < 4; ++k) {
+                        q += values[k] * q_corner[k];
+                        q_gradient += q_corner[k] * slopes[k].transpose();
+                    }
+                    visit(spot, q, q_gradient);
+                }
+                continue;
+            }
             const CellWeights& w = body.corner_weights[body.place_of(p)];
             Vec2 q = Vec2::Zero();
             Mat2 q_gradient = Mat2::Zero();
@@ -174,7 +228,7 @@ void for_points_in(const Discretisation& body, const Vec2& tip, const Extension&
                 q += w.value[k] * q_corner[k];
                 q_gradient += q_corner[k] * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
             }
-            visit(p, q, q_gradient);
+            visit(Spot{p, body.points.position[p], body.points.volume[p], nullptr, false}, q, q_gradient);
         }
     });
 }
@@ -191,9 +245,10 @@ constexpr double little_change = 0.1;
 Vec2 mean_velocity(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal) {
     Vec2 sum = Vec2::Zero();
     double mass = 0.0;
-    for_points_in(body, tip, extension, [&](int p, const Vec2&, const Mat2&) {
-        sum += body.points.mass[p] * value_at(body, p, nodal.velocity);
-        mass += body.points.mass[p];
+    for_points_in(body, tip, extension, [&](const Spot& spot, const Vec2&, const Mat2&) {
+        const double here = body.points.density(spot.point) * spot.volume;
+        sum += here * spot.value(body, nodal.velocity);
+        mass += here;
     });
     return mass > 0.0 ? Vec2(sum / mass) : sum;
 }
@@ -204,12 +259,13 @@ ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, con
     const Vec2 as_a_whole = mean_velocity(body, tip, extension, nodal);
     double sum = 0.0;
     double change_along = 0.0, change = 0.0;  // explicit gradients of the energy [J/m]
-    for_points_in(body, tip, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
-        const Mat2 u_gradient = seen_gradient_at(body, p, nodal.displacement, rotates);
+    for_points_in(body, tip, extension, [&](const Spot& spot, const Vec2& q, const Mat2& q_gradient) {
+        const int p = spot.point;
+        const Mat2 u_gradient = spot.seen_gradient(body, nodal.displacement, rotates);
         const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
-        const Vec2 v = value_at(body, p, nodal.velocity) - as_a_whole;
-        const Vec2 a = value_at(body, p, nodal.acceleration);
-        const Mat2 v_gradient = gradient_at(body, p, nodal.velocity);
+        const Vec2 v = spot.value(body, nodal.velocity) - as_a_whole;
+        const Vec2 a = spot.value(body, nodal.acceleration);
+        const Mat2 v_gradient = spot.gradient(body, nodal.velocity);
         const double density = points.density(p);
         double integrand = (state.stress.transpose() * u_gradient).cwiseProduct(q_gradient.transpose()).sum() -
                            (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
@@ -218,10 +274,10 @@ ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, con
             const WoodGradient wood(body, p);
             const Vec2 gradient = wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density;
             integrand -= gradient.dot(q);
-            change_along += std::abs(gradient.dot(q)) * points.volume[p];
-            change += gradient.norm() * q.norm() * points.volume[p];
+            change_along += std::abs(gradient.dot(q)) * spot.volume;
+            change += gradient.norm() * q.norm() * spot.volume;
         }
-        sum += integrand * points.volume[p];
+        sum += integrand * spot.volume;
     });
     return {sum / body.layout.thickness, change_along < little_change * change};
 }
@@ -230,8 +286,9 @@ ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, con
 Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal) {
     Mat2 sum = Mat2::Zero();
     int count = 0;
-    for_points_in(body, tip, extension, [&](int p, const Vec2&, const Mat2&) {
-        sum += gradient_at(body, p, nodal.displacement);
+    for_points_in(body, tip, extension, [&](const Spot& spot, const Vec2&, const Mat2&) {
+        if (spot.is_sliver) return;
+        sum += gradient_at(body, spot.point, nodal.displacement);
         ++count;
     });
     return Polar(sum / count).turn;
@@ -314,13 +371,14 @@ Mat2 stress_of_unevenness(const Discretisation& body, int p, const std::vector<V
 }
 
 // From the frame that has turned with the wood around the tip.
-Seen seen_at(const Discretisation& body, int p, const NodalState& nodal, const Mat2& turn, bool rotates) {
-    const Mat2 gradient = seen_gradient_at(body, p, nodal.displacement, rotates);
+Seen seen_at(const Discretisation& body, const Spot& spot, const NodalState& nodal, const Mat2& turn, bool rotates) {
+    const int p = spot.point;
+    const Mat2 gradient = spot.seen_gradient(body, nodal.displacement, rotates);
     PointState state = elastic_state(gradient, body.points.stiffness_of(p), rotates);
     state.stress += stress_of_unevenness(body, p, nodal.displacement, turn);
     Seen seen;
     seen.strain = state.strain;
-    seen.inertia = body.points.density(p) * value_at(body, p, nodal.acceleration);
+    seen.inertia = body.points.density(p) * spot.value(body, nodal.acceleration);
     if (rotates) {
         const Mat2 back = turn.transpose();
         seen.gradient = back * (Mat2::Identity() + gradient) - Mat2::Identity();
@@ -389,14 +447,14 @@ Vec2 intensity_factors(const Discretisation& body, const CrackFields& cracks, co
     Mat2 axes;
     axes << tip.direction, left_of(tip.direction);
     Vec2 sum = Vec2::Zero();
-    for_points_in(body, tip.position, extension, [&](int p, const Vec2& q, const Mat2& q_gradient) {
-        Seen fixed = seen_at(body, p, nodal, turn, rotates);
+    for_points_in(body, tip.position, extension, [&](const Spot& spot, const Vec2& q, const Mat2& q_gradient) {
+        Seen fixed = seen_at(body, spot, nodal, turn, rotates);
         if (points.changes.empty() && q_gradient.isZero() && fixed.inertia.isZero()) return;
         fixed.q = q;
         fixed.q_gradient = q_gradient;
         const Seen s = fixed.in(axes);
-        const double r = std::max(closest, (points.position[p] - tip.position).norm());
-        const double angle = angle_from_tip(line, at_end, points.position[p]);
+        const double r = std::max(closest, (spot.position - tip.position).norm());
+        const double angle = angle_from_tip(line, at_end, spot.position);
         const Eigen::Vector3d there = field.strain(s.stress);
         Mat2 other_wood;
         other_wood << there[0], 0.5 * there[2], 0.5 * there[2], there[1];
@@ -410,7 +468,7 @@ Vec2 intensity_factors(const Discretisation& body, const CrackFields& cracks, co
                                s.inertia.dot(near.gradient * s.q);
             if (!points.changes.empty())
                 for (int k = 0; k < 2; ++k) integrand += s.q[k] * other_wood.cwiseProduct(near.stress_slope[k]).sum();
-            sum[mode] += integrand * points.volume[p];
+            sum[mode] += integrand * spot.volume;
         }
     });
     sum += body.layout.thickness * work_on_bent_faces(cracks, line, at_end, field, extension, nodal.displacement, turn, rotates,

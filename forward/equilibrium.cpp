@@ -53,9 +53,9 @@ constexpr double least_kept = 1e-3;
 
 Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body, int threads,
                          const Equilibrium* same)
-    : scene_(scene), plan_(plan), body_(body), materials_(materials), cracks_(scene, body, materials, least_freed_at_rest),
-      boundary_(scene, body, cracks_, &materials), gauges_(scene),
-      history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
+    : scene_(scene), plan_(plan), body_(body), materials_(materials),
+      cracks_(scene, body, materials, least_freed_at_rest, plan.cuts_domains), boundary_(scene, body, cracks_, &materials),
+      gauges_(scene), history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
       internal_force_(body, materials, plan.rotates, history_.get()), side_by_side_(threads > 1),
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -310,7 +310,16 @@ void Equilibrium::add_lone_points() {
         for (int a = 0; a < 4; ++a)
             for (int b = 0; b < 4; ++b)
                 tangent.block<2, 2>(2 * a, 2 * b) = alone.stiffness * sign[a] * sign[b] * Mat2::Identity();
-        add_extra(body_.points.cell[alone.point], body_.points.node[alone.point], tangent);
+        add_extra(alone.cell, alone.node, tangent);
+    }
+}
+
+void Equilibrium::add_slivers(bool geometric) {
+    for (const Sliver& sliver : body_.slivers) {
+        const auto [own, less] = internal_force_.tangents(sliver, displacement_, geometric);
+        const int cell = body_.points.cell[sliver.point];
+        add_extra(cell, sliver.node, own);
+        add_extra(cell, body_.points.node[sliver.point], less);
     }
 }
 
@@ -395,6 +404,7 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     extra_.clear();
     lessons_.clear();
     add_lone_points();
+    add_slivers(geometric);
     add_pairs();
     add_edge_ties();
     add_hinges();
@@ -628,25 +638,37 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
 }
 
 // Where points have come to other fields the factor is to be made anew, and where they share a node with such points.
-void Equilibrium::mark_moved_points(const PointTable<int>& before) {
+void Equilibrium::mark_moved_points(const PointTable<int>& before, const std::vector<Sliver>& slivers_before) {
+    const auto mark_about = [&](int c) {
+        const Vec2 corner = body_.layout.cell_corner(c);
+        const Vec2& cell = body_.layout.cell;
+        body_.for_cells_in({corner - 0.5 * cell, corner + 1.5 * cell}, [&](int near) { factor_.mark(near); });
+    };
     int last = -1;
     for (int p = 0; p < body_.points.count(); ++p) {
         const int c = body_.points.cell[p];
         if (c == last || std::ranges::equal(before[p], std::as_const(body_.points).node[p])) continue;
         last = c;
-        const Vec2 corner = body_.layout.cell_corner(c);
-        const Vec2& cell = body_.layout.cell;
-        body_.for_cells_in({corner - 0.5 * cell, corner + 1.5 * cell}, [&](int near) { factor_.mark(near); });
+        mark_about(c);
     }
+    const auto mark_new = [&](const std::vector<Sliver>& slivers, const std::vector<Sliver>& others) {
+        for (const Sliver& sliver : slivers) {
+            const auto same = std::ranges::lower_bound(others, sliver.point, {}, &Sliver::point);
+            if (same == others.end() || *same != sliver) mark_about(body_.points.cell[sliver.point]);
+        }
+    };
+    mark_new(body_.slivers, slivers_before);
+    mark_new(slivers_before, body_.slivers);
 }
 
 Equilibrium::Snapshot Equilibrium::save() const {
-    return {cracks_, body_.points.node, boundary_.held, boundary_.tied, pieces_, displacement_, time_, contacts()};
+    return {cracks_, body_.points.node, body_.slivers, boundary_.held, boundary_.tied, pieces_, displacement_, time_, contacts()};
 }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
     const PointTable<int> before = std::exchange(body_.points.node, snapshot.node);
+    const std::vector<Sliver> slivers_before = std::exchange(body_.slivers, snapshot.slivers);
     boundary_.held = snapshot.held;
     boundary_.tied = snapshot.tied;
     pieces_ = snapshot.pieces;
@@ -656,7 +678,7 @@ void Equilibrium::restore(const Snapshot& snapshot) {
     set_contacts(snapshot.contacts);
     internal_force_.sort_cells();
     renumber();
-    mark_moved_points(before);
+    mark_moved_points(before, slivers_before);
     find_forces();
 }
 

@@ -117,6 +117,7 @@ class Equilibrium {
     struct Snapshot {
         CrackFields cracks;
         PointTable<int> node;
+        std::vector<Sliver> slivers;
         std::vector<Boundary::Held> held;
         std::vector<Boundary::Tied> tied;
         LoosePieces pieces;
@@ -140,7 +141,7 @@ class Equilibrium {
   private:
     TipLoad load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const;
     void renumber();
-    void mark_moved_points(const PointTable<int>& fields_before);
+    void mark_moved_points(const PointTable<int>& fields_before, const std::vector<Sliver>& slivers_before);
     void mark_changes(bool geometric, double slack);
     void find_forces();
     bool factor_tangent(bool geometric, double slack = 0.0);
@@ -156,6 +157,7 @@ class Equilibrium {
     template <class Visit>
     void for_groups_of(int cell, const Visit& visit) const;
     void add_lone_points();
+    void add_slivers(bool geometric);
     int cell_at(int node) const;
     void add_pairs();
     void add_edge_ties();

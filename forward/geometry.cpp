@@ -91,6 +91,55 @@ std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, c
     return leave;
 }
 
+std::optional<std::array<double, 2>> part_within(const Vec2& a, const Vec2& b, const Box& box) {
+    double enter = 0.0, leave = 1.0;
+    for (int axis = 0; axis < 2; ++axis) {
+        const double d = b[axis] - a[axis];
+        if (d == 0.0) {
+            if (a[axis] <= box.low[axis] || a[axis] >= box.high[axis]) return std::nullopt;
+            continue;
+        }
+        const double to_low = (box.low[axis] - a[axis]) / d, to_high = (box.high[axis] - a[axis]) / d;
+        enter = std::max(enter, std::min(to_low, to_high));
+        leave = std::min(leave, std::max(to_low, to_high));
+    }
+    if (leave <= enter) return std::nullopt;
+    return std::array{enter, leave};
+}
+
+Piece left_part(const Box& box, const Vec2& a, const Vec2& b) {
+    const std::array<Vec2, 4> corners{box.low, Vec2(box.high.x(), box.low.y()), box.high, Vec2(box.low.x(), box.high.y())};
+    std::vector<Vec2> outline;
+    const auto side = [&](const Vec2& x) { return cross(b - a, x - a); };
+    for (int k = 0; k < 4; ++k) {
+        const Vec2 &from = corners[k], &to = corners[(k + 1) % 4];
+        const double here = side(from), there = side(to);
+        if (here >= 0.0) outline.push_back(from);
+        if ((here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0))
+            outline.push_back(from + here / (here - there) * (to - from));
+    }
+    Piece piece{0.0, Vec2::Zero(), Vec2::Zero(), {box.high, box.low}};
+    for (const Vec2& x : outline) piece.bounds = {piece.bounds.low.cwiseMin(x), piece.bounds.high.cwiseMax(x)};
+    for (const bool middle_is_known : {false, true}) {  // triangles about the first corner
+        for (std::size_t k = 2; k < outline.size(); ++k) {
+            const Vec2 p = outline[0] - piece.middle, q = outline[k - 1] - piece.middle, r = outline[k] - piece.middle;
+            const double area = 0.5 * cross(q - p, r - p);
+            if (middle_is_known)
+                piece.moments += area / 12.0 * (p.cwiseAbs2() + q.cwiseAbs2() + r.cwiseAbs2() + (p + q + r).cwiseAbs2());
+            else piece.area += area;
+        }
+        if (piece.area == 0.0) return piece;
+        if (middle_is_known) break;
+        Vec2 sum = Vec2::Zero();
+        for (std::size_t k = 2; k < outline.size(); ++k)
+            sum += 0.5 * cross(outline[k - 1] - outline[0], outline[k] - outline[0]) *
+                   (outline[0] + outline[k - 1] + outline[k]) / 3.0;
+        piece.middle = sum / piece.area;
+    }
+    piece.moments /= piece.area;
+    return piece;
+}
+
 double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x) {
     const Vec2 along = b - a;
     const double squared = along.squaredNorm();

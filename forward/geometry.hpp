@@ -2,6 +2,7 @@
 
 #include "datasets/scene.hpp"
 
+#include <array>
 #include <optional>
 
 namespace crampfit {
@@ -38,6 +39,19 @@ OutlinePoint nearest_on_outline(const Shape& shape, const Vec2& x);
 
 /// Where along a ray from `origin` with unit `direction` it leaves the box for good; nothing when it misses the box [m].
 std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, const Box& box);
+
+/// What of a straight line goes through a box, as fractions of the way from a to b; nothing where it only touches it.
+std::optional<std::array<double, 2>> part_within(const Vec2& a, const Vec2& b, const Box& box);
+
+struct Piece {
+    double area;   // [m^2]
+    Vec2 middle;   // of it [m]
+    Vec2 moments;  // second ones about its middle, of x and y, over the area [m^2]
+    Box bounds;
+};
+
+/// What of a box lies on the left of the line from a to b. No area: nothing does.
+Piece left_part(const Box& box, const Vec2& a, const Vec2& b);
 
 /// Nearest place on segment a-b to x, as a fraction of the way from a to b.
 double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x);

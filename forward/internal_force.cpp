@@ -6,6 +6,18 @@
 
 namespace crampfit {
 
+namespace {
+
+// What is alone on its fields has second moments of so much of a cell's at least, times their volumes: a sliver in a corner
+// hardly moves with the node across, and would spoil the condition of the stiffness.
+constexpr double least_crosswise = 1e-3;
+
+Eigen::Matrix3d matrix_of(const std::array<double, 6>& C) {
+    return (Eigen::Matrix3d() << C[0], C[1], C[4], C[1], C[2], C[5], C[4], C[5], C[3]).finished();
+}
+
+}  // namespace
+
 InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history)
     : body_(body), rotates_(rotates), history_(history), uneven_(body, materials, rotates, history), strips_(body.layout) {
     sort_cells();
@@ -16,42 +28,88 @@ void InternalForce::sort_cells() {
     const Points& points = body_.points;
     whole_cells_.clear();
     loose_points_.clear();
+    shortened_.clear();
     alone_.clear();
     remembering_.clear();
     first_of_strip_.clear();
     uneven_.sort();
     for (int c = 0; c < layout.cells(); ++c) {
         if (c == strips_.first_cell(static_cast<int>(first_of_strip_.size())))
-            first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
+            first_of_strip_.push_back(
+                {whole_cells_.size(), loose_points_.size(), shortened_.size(), alone_.size(), remembering_.size()});
         const int first = points.first_of_cell[c];
         const int last = points.first_of_cell[c + 1];
-        const auto alike = [&](int p) {
+        const std::span<const Sliver> slivers = body_.slivers_of(c, c + 1);
+        const auto is_alone = [&](std::span<const int> fields) {
             int count = 0;
-            for (int q = first; q < last; ++q) count += points.node.same(p, q);
-            return count;
+            for (int q = first; q < last; ++q) count += std::ranges::equal(fields, points.node[q]);
+            for (const Sliver& sliver : slivers) count += std::ranges::equal(fields, sliver.node);
+            return count == 1;
         };
         const bool remembers = history_ && history_->is_in(c);
         if (!remembers && body_.cell_is_whole(c)) {
             whole_cells_.push_back(c);
+        } else if (const auto rest = rest_of_whole(c)) {
+            shortened_.push_back(*rest);
         } else {
             for (int p = first; p < last; ++p) {
                 if (!remembers) loose_points_.push_back(p);
-                if (layout.degree == 1 && alike(p) == 1) alone_.push_back({p, crosswise_stiffness(p, points.stiffness_of(p))});
+                if (layout.degree == 1 && is_alone(points.node[p])) add_alone(p);
             }
             if (remembers) for_groups(points, c, [&](const PointGroup& group) { remembering_.push_back(group); });
         }
+        for (const Sliver& sliver : slivers)
+            if (is_alone(sliver.node)) add_alone(c, sliver.node, sliver.share * points.volume[sliver.point], sliver.moments);
     }
-    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), alone_.size(), remembering_.size()});
+    first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), shortened_.size(), alone_.size(), remembering_.size()});
 }
 
-double InternalForce::crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const {
-    // With the second moments of the domain, side^2 / 12, the energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y
-    // C_ss) q_y^2], shear coupling aside.
+// A cell all of whose points are on the same fields, and some of which have slivers.
+std::optional<InternalForce::Shortened> InternalForce::rest_of_whole(int c) const {
     const Points& points = body_.points;
-    const Vec2 moment = body_.layout.point_size().cwiseAbs2() / 12.0;
+    const std::span<const Sliver> slivers = body_.slivers_of(c, c + 1);
+    if (slivers.empty() || !body_.cell_is_full(c)) return std::nullopt;
+    const int first = points.first_of_cell[c], last = points.first_of_cell[c + 1];
+    for (int p = first + 1; p < last; ++p)
+        if (!points.node.same(p, first)) return std::nullopt;
+    Shortened rest{c, 1.0, Vec2::Constant(0.5)};
+    for (const Sliver& sliver : slivers) {
+        const double share = sliver.share / body_.layout.points_per_cell();
+        rest.share -= share;
+        rest.middle -= share * (sliver.position - body_.layout.cell_corner(c)).cwiseQuotient(body_.layout.cell);
+    }
+    rest.middle /= rest.share;
+    return rest;
+}
+
+double InternalForce::crosswise_stiffness(const Alone& alone, const Eigen::Matrix3d& stiffness) const {
+    // The energy of q is V/2 [(I_y C_xx + I_x C_ss) q_x^2 + (I_x C_yy + I_y C_ss) q_y^2], shear coupling aside.
+    const Vec2& moment = alone.moments;
     const double both = moment.y() * stiffness(0, 0) + moment.x() * stiffness(1, 1) + moment.sum() * stiffness(2, 2);
     const double area = body_.layout.cell.prod();
-    return 0.5 * points.volume[point] * both / (area * area);
+    return 0.5 * alone.volume * both / (area * area);
+}
+
+void InternalForce::add_alone(int p) {
+    const Points& points = body_.points;
+    Vec2 moments = body_.layout.point_size().cwiseAbs2() / 12.0;
+    double left = 1.0;
+    for (const Sliver& sliver : body_.slivers_of(points.cell[p], points.cell[p] + 1)) {
+        if (sliver.point != p) continue;
+        const Vec2& middle = points.position[p];
+        left -= sliver.share;
+        moments -= sliver.share * (sliver.moments + (sliver.position - middle).cwiseAbs2());
+        moments = moments / left - (sliver.middle_of_rest(middle) - middle).cwiseAbs2();
+    }
+    add_alone(points.cell[p], points.node[p], left * points.volume[p], moments);
+}
+
+void InternalForce::add_alone(int cell, std::span<const int> fields, double volume, const Vec2& moments) {
+    const Vec2& size = body_.layout.cell;
+    const Vec2 least = least_crosswise * size.prod() * body_.layout.thickness / volume * size.cwiseAbs2();
+    Alone alone{cell, {fields[0], fields[1], fields[2], fields[3]}, volume, moments.cwiseMax(least), 0.0};
+    alone.stiffness = crosswise_stiffness(alone, body_.points.stiffness_of(body_.points.first_of_cell[cell]));
+    alone_.push_back(alone);
 }
 
 // The wood as it is, and its slope by a number.
@@ -73,9 +131,7 @@ struct InternalForce::ChangeOfWood {
     }
     const Vec2& moduli(int cell) const { return number.moduli(cell); }
     const Unevenness& unevenness(const UnevenCells::Piece& piece) const { return number.unevenness(piece.cell, piece.box); }
-    double of_alone(const Alone& alone) const {
-        return force.crosswise_stiffness(alone.point, number.stiffness(force.body_.points.cell[alone.point]));
-    }
+    double of_alone(const Alone& alone) const { return force.crosswise_stiffness(alone, number.stiffness(alone.cell)); }
     bool has(int cell) const { return !number.stiffness(cell).isZero(0.0); }
 };
 
@@ -330,10 +386,74 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const s
     const int cell = body_.points.cell[first];
     if (history_ && history_->is_in(cell)) return remembering_tangent({first, count}, displacement, geometric);
     if (body_.layout.degree == 1 && body_.cell_is_whole(cell)) return whole_tangent(cell, displacement, geometric);
-    Eigen::Matrix<double, 8, 8> sum = elastic_tangent_of(first, count, displacement, geometric);
+    const Shortened* rest = shortened(cell);
+    Eigen::Matrix<double, 8, 8> sum =
+        rest ? rest_of(*rest, body_.points.stiffness_of(first), body_.points.moduli[cell], displacement).tangent(geometric)
+             : elastic_tangent_of(first, count, displacement, geometric);
     for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1))
-        if (piece.point >= first && piece.point < first + count) sum += uneven_.tangent(piece, displacement, geometric);
+        if (!piece.is_sliver && piece.point >= first && piece.point < first + count)
+            sum += uneven_.tangent(piece, displacement, geometric);
     return sum;
+}
+
+BilinearPiece InternalForce::rest_of(const Shortened& cell, const Eigen::Matrix3d& stiffness, const Vec2& moduli,
+                                     const std::vector<Vec2>& displacement) const {
+    const Layout& layout = body_.layout;
+    BilinearPiece::Wood wood;
+    wood.S = cell.share * layout.thickness * layout.cell.prod() * stiffness;
+    wood.H = (cell.share * bending_stiffness(moduli)).asDiagonal();
+    return {wood, cell.middle, layout.cell, body_.points.node[body_.points.first_of_cell[cell.cell]], displacement, rotates_};
+}
+
+const InternalForce::Shortened* InternalForce::shortened(int c) const {
+    const auto found = std::ranges::lower_bound(shortened_, c, {}, &Shortened::cell);
+    return found != shortened_.end() && found->cell == c ? &*found : nullptr;
+}
+
+// The sliver itself, what is left of the point, and less the point as it would be without.
+std::array<InternalForce::Corners, 3> InternalForce::changes_by(const Sliver& sliver) const {
+    const Points& points = body_.points;
+    const int p = sliver.point, c = points.cell[p];
+    const auto node = points.node[p];
+    const std::array<int, 4> own{node[0], node[1], node[2], node[3]};
+    const double volume = points.volume[p];
+    const CellWeights& w = body_.weights[points.slot[p]];
+    Corners whole{own, {}, -volume};
+    for (int k = 0; k < 4; ++k) whole.slope[k] = {w.slope_x[k], w.slope_y[k]};
+    if (shortened(c)) return {{{sliver.node, body_.slopes_at(c, sliver.position), sliver.share * volume}}};
+    return {{{sliver.node, body_.slopes_at(c, sliver.position), sliver.share * volume},
+             {own, body_.slopes_at(c, sliver.middle_of_rest(points.position[p])), (1.0 - sliver.share) * volume},
+             whole}};
+}
+
+Mat2 InternalForce::Corners::gradient(const std::vector<Vec2>& displacement) const {
+    Mat2 sum = Mat2::Zero();
+    for (int k = 0; k < 4; ++k) sum += displacement[node[k]] * slope[k].transpose();
+    return sum;
+}
+
+std::array<Eigen::Matrix<double, 8, 8>, 2> InternalForce::tangents(const Sliver& sliver, const std::vector<Vec2>& displacement,
+                                                                   bool geometric) const {
+    const auto tangent = [&](const Corners& at) {
+        std::array<double, 6> C = body_.points.stiffness[body_.points.cell[sliver.point]];
+        for (double& c : C) c *= at.volume;
+        const Mat2 G = at.gradient(displacement);
+        const auto A = elastic_tangent<double>({G(0, 0), G(0, 1), G(1, 0), G(1, 1)}, C, rotates_, geometric);
+        Eigen::Matrix4d second;  // by the gradient's xx, xy, yx, yy
+        for (int a = 0; a < 4; ++a)
+            for (int b = 0; b < 4; ++b) second(a, b) = A[a][b];
+        Eigen::Matrix<double, 4, 8> slopes = Eigen::Matrix<double, 4, 8>::Zero();
+        for (int k = 0; k < 4; ++k)
+            for (int axis = 0; axis < 2; ++axis) slopes.block<2, 1>(2 * axis, 2 * k + axis) = at.slope[k];
+        return Eigen::Matrix<double, 8, 8>(slopes.transpose() * second * slopes);
+    };
+    const auto [own, rest, whole] = changes_by(sliver);
+    std::array<Eigen::Matrix<double, 8, 8>, 2> both{tangent(own), Eigen::Matrix<double, 8, 8>::Zero()};
+    if (rest.volume > 0.0) both[1] = tangent(rest) + tangent(whole);
+    const int c = body_.points.cell[sliver.point];
+    for (const UnevenCells::Piece& piece : uneven_.pieces(c, c + 1))
+        if (piece.is_sliver && piece.point == sliver.point) both[0] += uneven_.tangent(piece, displacement, geometric);
+    return both;
 }
 
 Eigen::Matrix<double, 8, 8> InternalForce::whole_tangent(int cell, const std::vector<Vec2>& displacement, bool geometric) const {
@@ -407,25 +527,44 @@ double InternalForce::visit(int strip, const Wood& wood, const std::vector<Vec2>
     const bool forces = wanted != Wanted::energy;
     const std::span<const int> cells(whole_cells_.data() + from.whole_cell, to.whole_cell - from.whole_cell);
     double energy = visit_cells(cells, wood, displacement, wanted, force);
+    for (std::size_t i = from.shortened; i < to.shortened; ++i) {
+        const int c = shortened_[i].cell;
+        if (!wood.has(c)) continue;
+        const auto node = points.node[points.first_of_cell[c]];
+        const BilinearPiece piece = rest_of(shortened_[i], matrix_of(wood.stiffness(c)), wood.moduli(c), displacement);
+        energy += piece.energy();
+        if (!forces) continue;
+        const Eigen::Matrix<double, 8, 1> pull = piece.force();
+        for (int k = 0; k < 4; ++k) (*force)[node[k]] -= pull.segment<2>(2 * k);
+    }
     for (std::size_t i = from.loose_point; i < to.loose_point; ++i) {
         const int p = loose_points_[i];
         if (!wood.has(points.cell[p])) continue;
         const auto& C = wood.stiffness(points.cell[p]);
-        const PointState state =
-            elastic_state(gradient_at(body_, p, displacement),
-                          (Eigen::Matrix3d() << C[0], C[1], C[4], C[1], C[2], C[5], C[4], C[5], C[3]).finished(), rotates_);
+        const PointState state = elastic_state(gradient_at(body_, p, displacement), matrix_of(C), rotates_);
         energy += points.volume[p] * state.energy;
         if (forces) add_stress(p, state.stress, *force);
+    }
+    for (const Sliver& sliver : body_.slivers_of(strips_.first_cell(strip), strips_.first_cell(strip + 1))) {
+        const int p = sliver.point, c = points.cell[p];
+        if (!wood.has(c)) continue;
+        const Eigen::Matrix3d stiffness = matrix_of(wood.stiffness(c));
+        for (const Corners& at : changes_by(sliver)) {
+            if (at.volume == 0.0) continue;
+            const PointState state = elastic_state(at.gradient(displacement), stiffness, rotates_);
+            energy += at.volume * state.energy;
+            for (int k = 0; k < 4 && forces; ++k) (*force)[at.node[k]] -= at.volume * (state.stress * at.slope[k]);
+        }
     }
     for (const UnevenCells::Piece& piece : uneven_.pieces(strips_.first_cell(strip), strips_.first_cell(strip + 1))) {
         if (!wood.has(piece.cell)) continue;
         const UnevenCells::State state = uneven_.state(piece, wood.unevenness(piece), displacement);
         energy += state.energy;
-        for (int k = 0; k < 4 && forces; ++k) (*force)[points.node[piece.point][k]] -= state.force.segment<2>(2 * k);
+        for (int k = 0; k < 4 && forces; ++k) (*force)[piece.node[k]] -= state.force.segment<2>(2 * k);
     }
     for (std::size_t i = from.alone; i < to.alone; ++i) {
         const double stiffness = wood.of_alone(alone_[i]);
-        const auto node = points.node[alone_[i].point];
+        const auto& node = alone_[i].node;
         Vec2 apart = Vec2::Zero();  // u_0 - u_1 - u_2 + u_3
         for (int k = 0; k < 4; ++k) apart += crosswise_sign[k] * displacement[node[k]];
         energy += 0.5 * stiffness * apart.squaredNorm();

@@ -6,6 +6,7 @@
 #include "forward/uneven_cells.hpp"
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -26,6 +27,9 @@ namespace crampfit {
 /// crosswise, by +1, -1, -1, +1, and strain nothing. So it is integrated over its domain and not at its middle only: the gradient
 /// changes there by q (y - y_p), q (x - x_p) with q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), which adds the energy k/2 |u_0 - u_1 -
 /// u_2 + u_3|^2. A straight line among displacements does not feel it. (B-splines reach on into cells with more points.)
+///
+/// Where a crack cuts a point's domain, what lies beyond the crack (`Sliver`) counts with its own fields, at its own middle, and
+/// no more with the point. So a crack lies where it was drawn and not where points end.
 ///
 /// Points that remember are taken apart from the others: they take a step of their history along.
 ///
@@ -51,9 +55,16 @@ class InternalForce {
     /// `geometric` as in `elastic_tangent`.
     Eigen::Matrix<double, 8, 8> tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
 
+    /// The same of a sliver, and what it changes of its point's.
+    std::array<Eigen::Matrix<double, 8, 8>, 2> tangents(const Sliver& sliver, const std::vector<Vec2>& displacement,
+                                                        bool geometric) const;
+
     struct Alone {
-        int point;
-        double stiffness;  // k, the mean of both directions, so that it does not feel rotation [N/m]
+        int cell;
+        std::array<int, 4> node;  // fields
+        double volume;            // [m^3]
+        Vec2 moments;             // second ones about its middle, of x and y, over its area [m^2]
+        double stiffness;         // k, the mean of both directions, so that it does not feel rotation [N/m]
     };
     const std::vector<Alone>& alone() const { return alone_; }
 
@@ -64,8 +75,25 @@ class InternalForce {
 
   private:
     struct Place {  // in the lists below
-        std::size_t whole_cell, loose_point, alone, remembering;
+        std::size_t whole_cell, loose_point, shortened, alone, remembering;
     };
+
+    struct Shortened {  // a cell that would be whole without slivers
+        int cell;
+        double share;  // that is left of it
+        Vec2 middle;   // of that, in cells from the cell's lower left corner
+    };
+    std::optional<Shortened> rest_of_whole(int cell) const;
+    const Shortened* shortened(int cell) const;  // null: it is none
+    BilinearPiece rest_of(const Shortened& cell, const Eigen::Matrix3d& stiffness, const Vec2& moduli,
+                          const std::vector<Vec2>& displacement) const;
+    struct Corners {              // as a place in a cell sees them
+        std::array<int, 4> node;  // fields
+        std::array<Vec2, 4> slope;
+        double volume;  // for which they count [m^3]
+        Mat2 gradient(const std::vector<Vec2>& displacement) const;
+    };
+    std::array<Corners, 3> changes_by(const Sliver& sliver) const;
 
     struct OwnWood;
     struct ChangeOfWood;
@@ -86,7 +114,9 @@ class InternalForce {
                          std::vector<Vec2>* force) const;
     Vec2 bending_stiffness(const Vec2& moduli) const;
     Eigen::Matrix<double, 8, 8> whole_tangent(int cell, const std::vector<Vec2>& displacement, bool geometric) const;
-    double crosswise_stiffness(int point, const Eigen::Matrix3d& stiffness) const;
+    double crosswise_stiffness(const Alone& alone, const Eigen::Matrix3d& stiffness) const;
+    void add_alone(int point);
+    void add_alone(int cell, std::span<const int> fields, double volume, const Vec2& moments);
     Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
                                                    bool geometric) const;
     std::span<const PointGroup> remembering_of(int strip) const {
@@ -106,6 +136,7 @@ class InternalForce {
     History* history_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
+    std::vector<Shortened> shortened_;
     std::vector<Alone> alone_;
     std::vector<PointGroup> remembering_;
     UnevenCells uneven_;

@@ -24,6 +24,8 @@ std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks
     };
     for (int p = 0; p < body.points.count(); ++p)
         for (int k = 1; k < body.layout.nodes_per_cell(); ++k) join(body.points.node[p][0], body.points.node[p][k]);
+    for (const Sliver& sliver : body.slivers)
+        for (int k = 1; k < 4; ++k) join(sliver.node[0], sliver.node[k]);
     for (const FieldPair& pair : cracks.pairs)
         if (shared_tie(pair, mass) > 0.0) join(pair.left, pair.right);
     for (std::size_t f = 0; f < piece.size(); ++f) piece[f] = first(static_cast<int>(f));

@@ -354,6 +354,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
                "the run would never end: what is measured does not get there, and no time ends it");
     plan.remembers = materials.remembers();
+    // The way of a crack that turns hangs on the material, and what it cuts off would too: derivatives hold the way.
+    const auto goes_straight = [](const Crack& crack) {
+        return crack.grows == Growth::none || crack.direction == GrowthDirection::straight;
+    };
+    plan.cuts_domains = plan.quasistatic && scene.cracks.size() == 1 && goes_straight(scene.cracks.front()) && !plan.remembers;
     check_memory(scene, plan.quasistatic, materials, body);
     check_bridging(scene, plan.quasistatic, materials, body);
 
@@ -453,7 +458,9 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else
         choose("crack fields", fmt::format("{} crack{}", scene.cracks.size(), scene.cracks.size() == 1 ? "" : "s"),
                std::string("two fields at nodes whose support a crack cuts, ") +
-                   (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere");
+                   (scene.cracks.size() > 1 ? "up to four where two cracks do, " : "") + "one elsewhere; " +
+                   (plan.cuts_domains ? "what it cuts off a point's domain moves with the wood on that side"
+                                      : "points lie on one side or the other"));
     if (!scene.cracks.empty())
         choose("J, K",
                plan.remembers ? "at saved instants; not a number where wood within 5.5 cells of the tip remembers"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ranges>
 
 namespace crampfit {
 
@@ -26,6 +27,51 @@ void UnevenCells::sort() {
     for (const Discretisation::UnevenCell& cell : body_.uneven_cells) {
         if (history_ && history_->is_in(cell.cell)) continue;
         const int first = points.first_of_cell[cell.cell];
+        const std::span<const Sliver> slivers = body_.slivers_of(cell.cell, cell.cell + 1);
+        const auto add = [&](int p, bool is_sliver, std::span<const int> node, const PointBox& box, double share, const Vec2& x) {
+            const double of_cell = share * (box.to_x - box.from_x) * (box.to_y - box.from_y) / (side * side);
+            pieces_.push_back({cell.cell,
+                               p,
+                               is_sliver,
+                               {node[0], node[1], node[2], node[3]},
+                               box,
+                               of_cell,
+                               (x - body_.layout.cell_corner(cell.cell)).cwiseQuotient(body_.layout.cell),
+                               &wood_of(cell, box)});
+        };
+        const auto same = [&](int k) { return points.node.same(first, first + k); };
+        const auto places = std::views::iota(0, side * side);
+        if (!slivers.empty() && std::ranges::all_of(places, same)) {
+            const PointBox all{0, 0, side, side};
+            double rest = 1.0;
+            Vec2 middle = body_.layout.cell_corner(cell.cell) + 0.5 * body_.layout.cell;
+            for (const Sliver& sliver : slivers) {
+                rest -= sliver.share / (side * side);
+                middle -= sliver.share / (side * side) * sliver.position;
+            }
+            add(first, false, points.node[first], all, rest, middle / rest);
+            for (const Sliver& sliver : slivers) {
+                const int k = sliver.point - first;
+                add(sliver.point, true, sliver.node, {k % side, k / side, k % side + 1, k / side + 1}, sliver.share,
+                    sliver.position);
+            }
+            continue;
+        }
+        if (!slivers.empty()) {
+            for (int k = 0; k < side * side; ++k) {
+                const int p = first + k;
+                const PointBox box{k % side, k / side, k % side + 1, k / side + 1};
+                const auto sliver = std::ranges::find(slivers, p, &Sliver::point);
+                const Vec2& middle = points.position[p];
+                if (sliver == slivers.end()) {
+                    add(p, false, points.node[p], box, 1.0, middle);
+                } else {
+                    add(p, false, points.node[p], box, 1.0 - sliver->share, sliver->middle_of_rest(middle));
+                    add(p, true, sliver->node, box, sliver->share, sliver->position);
+                }
+            }
+            continue;
+        }
         for (int start = 0; start < side * side; ++start) {
             // All points on the same fields, if they are a rectangle: else each by itself, so that a mirrored scene is cut alike.
             PointBox box{side, side, 0, 0};
@@ -40,7 +86,9 @@ void UnevenCells::sort() {
             const bool is_rectangle = count == (box.to_x - box.from_x) * (box.to_y - box.from_y);
             if (is_rectangle && start > least) continue;
             if (!is_rectangle) box = {start % side, start / side, start % side + 1, start / side + 1};
-            pieces_.push_back({cell.cell, first + start, box, &wood_of(cell, box)});
+            const Vec2 middle = body_.layout.cell_corner(cell.cell) +
+                                0.5 * Vec2(box.from_x + box.to_x, box.from_y + box.to_y).cwiseProduct(body_.layout.point_size());
+            add(first + start, false, points.node[first + start], box, 1.0, middle);
         }
     }
 }
@@ -54,15 +102,12 @@ std::span<const UnevenCells::Piece> UnevenCells::pieces(int first, int last) con
 // A piece whose energy is that of this wood.
 BilinearPiece UnevenCells::bilinear(const Piece& piece, const Unevenness& wood, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_.layout;
-    const PointBox& box = piece.box;
     const double area = layout.cell.prod();
-    const double share = static_cast<double>((box.to_x - box.from_x) * (box.to_y - box.from_y)) / layout.points_per_cell();
-    const double volume = share * layout.thickness;
-    const Vec2 middle = 0.5 / layout.per_side * Vec2(box.from_x + box.to_x, box.from_y + box.to_y);
+    const double volume = piece.share * layout.thickness;
     return {{volume * area * wood.stretch, volume * wood.coupling, volume / area * wood.bending},
-            middle,
+            piece.middle,
             layout.cell,
-            body_.points.node[piece.point],
+            piece.node,
             displacement,
             rotates_};
 }
@@ -71,10 +116,8 @@ UnevenCells::State UnevenCells::small_state(const Piece& piece, const Unevenness
                                             const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_.layout;
     const Vec2 cell = layout.cell;
-    const PointBox& box = piece.box;
-    const double side = layout.per_side, share = (box.to_x - box.from_x) * (box.to_y - box.from_y) / (side * side);
-    const double x = 0.5 * (box.from_x + box.to_x) / side, y = 0.5 * (box.from_y + box.to_y) / side;
-    const auto node = body_.points.node[piece.point];
+    const double x = piece.middle.x(), y = piece.middle.y();
+    const auto& node = piece.node;
     const Vec2 &u0 = displacement[node[0]], &u1 = displacement[node[1]], &u2 = displacement[node[2]], &u3 = displacement[node[3]];
     const Vec2 across = u0 - u1 - u2 + u3;
     const Vec2 by_x = (u1 - u0 + y * across) / cell.x(), by_y = (u2 - u0 + x * across) / cell.y();
@@ -83,7 +126,7 @@ UnevenCells::State UnevenCells::small_state(const Piece& piece, const Unevenness
     Eigen::Vector3d s = wood.coupling * across;
     if (!wood.stretch.isZero(0.0)) s += area * (wood.stretch * strain);
     const Vec2 t = wood.coupling.transpose() * strain + wood.bending * across / area;
-    const double volume = share * layout.thickness;
+    const double volume = piece.share * layout.thickness;
     const Vec2 along_x = volume / cell.x() * Vec2(s[0], s[2]), along_y = volume / cell.y() * Vec2(s[2], s[1]);
     const Vec2 pull = volume * t + y * along_x + x * along_y;
     State state{0.5 * volume * (s.dot(strain) + t.dot(across)), {}};

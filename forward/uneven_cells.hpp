@@ -3,6 +3,7 @@
 #include "forward/bilinear_piece.hpp"
 #include "forward/history.hpp"
 
+#include <array>
 #include <map>
 #include <span>
 #include <vector>
@@ -11,7 +12,8 @@ namespace crampfit {
 
 /// What the wood of a cell with more than one adds to the energy of its points, which all have the cell's average stiffness, for
 /// where in the cell each wood lies (`Unevenness`). It goes by pieces: rectangles of points on the same fields (`BilinearPiece`).
-/// Most cells are one piece; a crack cuts them in several, each with its own wood.
+/// Most cells are one piece; a crack cuts them in several, each with its own wood, and where it cuts points' domains, in what is
+/// left of each and the slivers.
 class UnevenCells {
   public:
     /// All must outlive this. Cells with a `history` have laws of their own; null: none has.
@@ -22,8 +24,12 @@ class UnevenCells {
 
     struct Piece {
         int cell;
-        int point;  // its first, which knows the fields
-        PointBox box;
+        int point;       // its first
+        bool is_sliver;  // of that point
+        std::array<int, 4> node;
+        PointBox box;  // whose wood it has
+        double share;  // of the cell
+        Vec2 middle;   // in cells from the cell's lower left corner
         const Unevenness* wood;
     };
     /// Those of cells `first` .. `last` - 1.

@@ -25,17 +25,23 @@ Matrix stiffness(const AtRest& run) {
     const auto add = [&](int row, int column, double value) {
         if (equation[row] >= 0 && equation[column] >= 0) entries.emplace_back(equation[row], equation[column], value);
     };
+    const auto add_element = [&](std::span<const int> node, const Eigen::Matrix<double, 8, 8>& K) {
+        for (int a = 0; a < 8; ++a)
+            for (int b = 0; b < 8; ++b) add(2 * node[a / 2] + a % 2, 2 * node[b / 2] + b % 2, K(a, b));
+    };
     const InternalForce internal(run.body, run.materials, false);
     const std::vector<Vec2> still(cracks.fields(), Vec2::Zero());
     for (int c = 0; c < run.body.layout.cells(); ++c)
         for_groups(points, c, [&](const PointGroup& group) {
-            const Eigen::Matrix<double, 8, 8> K = internal.tangent(group.first, group.count, still, false);
-            const auto node = points.node[group.first];
-            for (int a = 0; a < 8; ++a)
-                for (int b = 0; b < 8; ++b) add(2 * node[a / 2] + a % 2, 2 * node[b / 2] + b % 2, K(a, b));
+            add_element(points.node[group.first], internal.tangent(group.first, group.count, still, false));
         });
+    for (const Sliver& sliver : run.body.slivers) {
+        const auto [own, less] = internal.tangents(sliver, still, false);
+        add_element(sliver.node, own);
+        add_element(points.node[sliver.point], less);
+    }
     for (const auto& alone : internal.alone()) {
-        const auto node = points.node[alone.point];
+        const auto& node = alone.node;
         const auto& sign = crosswise_sign;
         for (int axis = 0; axis < 2; ++axis)
             for (int a = 0; a < 4; ++a)
