@@ -175,6 +175,20 @@ std::span<const Sliver> Discretisation::slivers_of(int first, int last) const {
     return {from, to};
 }
 
+std::optional<Discretisation::Rest> Discretisation::rest_of_cell(int c) const {
+    if (slivers.empty() || !cell_is_full_[c]) return std::nullopt;
+    const std::span<const Sliver> here = slivers_of(c, c + 1);
+    if (here.empty() || !points_are_together(c)) return std::nullopt;
+    Rest rest{1.0, Vec2::Constant(0.5)};
+    for (const Sliver& sliver : here) {
+        const double share = sliver.share / layout.points_per_cell();
+        rest.share -= share;
+        rest.middle -= share * (sliver.position - layout.cell_corner(c)).cwiseQuotient(layout.cell);
+    }
+    rest.middle /= rest.share;
+    return rest;
+}
+
 void Discretisation::mark_changes() {
     points.changes.assign(points.count(), Change::none);
     for (int p = 0; p < points.count(); ++p) {
@@ -297,12 +311,15 @@ void Discretisation::check_parts(const Scene& scene) const {
     }
 }
 
-bool Discretisation::cell_is_whole(int c) const {
-    if (!cell_is_full_[c]) return false;
+bool Discretisation::points_are_together(int c) const {
     const int first = points.first_of_cell[c];
     for (int p = first + 1; p < points.first_of_cell[c + 1]; ++p)
         if (!points.node.same(p, first)) return false;
-    return slivers_of(c, c + 1).empty();
+    return true;
+}
+
+bool Discretisation::cell_is_whole(int c) const {
+    return cell_is_full_[c] && points_are_together(c) && (slivers.empty() || slivers_of(c, c + 1).empty());
 }
 
 const Unevenness* Discretisation::unevenness_of_whole(int c) const {

@@ -8,6 +8,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -185,6 +186,12 @@ class Discretisation {
     std::array<Vec2, 4> slopes_at(int c, const Vec2& x) const;
     /// The slivers of the points of cells `first` .. `last` - 1.
     std::span<const Sliver> slivers_of(int first, int last) const;
+    struct Rest {      // that slivers leave of a cell
+        double share;  // of the cell
+        Vec2 middle;   // in cells from the cell's lower left corner
+    };
+    /// Of a full cell with slivers whose points all have the same fields; nothing for other cells.
+    std::optional<Rest> rest_of_cell(int c) const;
     bool cell_is_full(int c) const { return cell_is_full_[c]; }  // nothing of it is cut out or void
     bool cell_is_whole(int c) const;                             // full, and no crack between its points
     const Unevenness* unevenness_of_whole(int c) const;          // null where a cell is cut, or of one wood
@@ -212,6 +219,7 @@ class Discretisation {
     }
 
   private:
+    bool points_are_together(int c) const;  // on the same fields
     void find_weights(ShapeFunction kind);
     void check_parts(const Scene& scene) const;
     void mark_changes();

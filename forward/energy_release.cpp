@@ -201,34 +201,30 @@ void for_points_in(const Discretisation& body, const Vec2& tip, const Extension&
         std::array<Vec2, 4> q_corner;
         for (int k = 0; k < 4; ++k) q_corner[k] = extension.at(corners[k]);
         if (std::all_of(q_corner.begin(), q_corner.end(), [](const Vec2& q) { return q.isZero(); })) return;
-        const std::span<const Sliver> slivers = body.slivers_of(c, c + 1);
-        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
-            const auto cut = std::ranges::find(slivers, p, &Sliver::point);
-            if (cut != slivers.end()) {
-                const double volume = body.points.volume[p];
-                for (const Spot& spot :
-                     {Spot{p, cut->middle_of_rest(body.points.position[p]), (1.0 - cut->share) * volume, &*cut, false},
-                      Spot{p, cut->position, cut->share * volume, &*cut, true}}) {
-                    const auto values = body.values_at(c, spot.position);
-                    const auto slopes = body.slopes_at(c, spot.position);
-                    Vec2 q = Vec2::Zero();
-                    Mat2 q_gradient = Mat2::Zero();
-                    for (int k = 0; k < 4; ++k) {
-                        q += values[k] * q_corner[k];
-                        q_gradient += q_corner[k] * slopes[k].transpose();
-                    }
-                    visit(spot, q, q_gradient);
-                }
-                continue;
-            }
-            const CellWeights& w = body.corner_weights[body.place_of(p)];
+        const auto visit_with = [&](const Spot& spot, const auto& value, const auto& slope) {
             Vec2 q = Vec2::Zero();
             Mat2 q_gradient = Mat2::Zero();
             for (int k = 0; k < 4; ++k) {
-                q += w.value[k] * q_corner[k];
-                q_gradient += q_corner[k] * Vec2(w.slope_x[k], w.slope_y[k]).transpose();
+                q += value[k] * q_corner[k];
+                q_gradient += q_corner[k] * slope(k).transpose();
             }
-            visit(Spot{p, body.points.position[p], body.points.volume[p], nullptr, false}, q, q_gradient);
+            visit(spot, q, q_gradient);
+        };
+        const std::span<const Sliver> slivers = body.slivers_of(c, c + 1);
+        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
+            const Vec2& middle = body.points.position[p];
+            const double volume = body.points.volume[p];
+            const auto cut = std::ranges::find(slivers, p, &Sliver::point);
+            if (cut == slivers.end()) {
+                const CellWeights& w = body.corner_weights[body.place_of(p)];
+                visit_with({p, middle, volume, nullptr, false}, w.value, [&](int k) { return Vec2(w.slope_x[k], w.slope_y[k]); });
+                continue;
+            }
+            for (const Spot& spot : {Spot{p, cut->middle_of_rest(middle), (1.0 - cut->share) * volume, &*cut, false},
+                                     Spot{p, cut->position, cut->share * volume, &*cut, true}}) {
+                const auto slopes = body.slopes_at(c, spot.position);
+                visit_with(spot, body.values_at(c, spot.position), [&](int k) { return slopes[k]; });
+            }
         }
     });
 }

@@ -49,8 +49,8 @@ void InternalForce::sort_cells() {
         const bool remembers = history_ && history_->is_in(c);
         if (!remembers && body_.cell_is_whole(c)) {
             whole_cells_.push_back(c);
-        } else if (const auto rest = rest_of_whole(c)) {
-            shortened_.push_back(*rest);
+        } else if (const auto rest = body_.rest_of_cell(c)) {
+            shortened_.push_back({c, *rest});
         } else {
             for (int p = first; p < last; ++p) {
                 if (!remembers) loose_points_.push_back(p);
@@ -62,24 +62,6 @@ void InternalForce::sort_cells() {
             if (is_alone(sliver.node)) add_alone(c, sliver.node, sliver.share * points.volume[sliver.point], sliver.moments);
     }
     first_of_strip_.push_back({whole_cells_.size(), loose_points_.size(), shortened_.size(), alone_.size(), remembering_.size()});
-}
-
-// A cell all of whose points are on the same fields, and some of which have slivers.
-std::optional<InternalForce::Shortened> InternalForce::rest_of_whole(int c) const {
-    const Points& points = body_.points;
-    const std::span<const Sliver> slivers = body_.slivers_of(c, c + 1);
-    if (slivers.empty() || !body_.cell_is_full(c)) return std::nullopt;
-    const int first = points.first_of_cell[c], last = points.first_of_cell[c + 1];
-    for (int p = first + 1; p < last; ++p)
-        if (!points.node.same(p, first)) return std::nullopt;
-    Shortened rest{c, 1.0, Vec2::Constant(0.5)};
-    for (const Sliver& sliver : slivers) {
-        const double share = sliver.share / body_.layout.points_per_cell();
-        rest.share -= share;
-        rest.middle -= share * (sliver.position - body_.layout.cell_corner(c)).cwiseQuotient(body_.layout.cell);
-    }
-    rest.middle /= rest.share;
-    return rest;
 }
 
 double InternalForce::crosswise_stiffness(const Alone& alone, const Eigen::Matrix3d& stiffness) const {
@@ -400,9 +382,10 @@ BilinearPiece InternalForce::rest_of(const Shortened& cell, const Eigen::Matrix3
                                      const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_.layout;
     BilinearPiece::Wood wood;
-    wood.S = cell.share * layout.thickness * layout.cell.prod() * stiffness;
-    wood.H = (cell.share * bending_stiffness(moduli)).asDiagonal();
-    return {wood, cell.middle, layout.cell, body_.points.node[body_.points.first_of_cell[cell.cell]], displacement, rotates_};
+    wood.S = cell.rest.share * layout.thickness * layout.cell.prod() * stiffness;
+    wood.H = (cell.rest.share * bending_stiffness(moduli)).asDiagonal();
+    return {wood,         cell.rest.middle, layout.cell, body_.points.node[body_.points.first_of_cell[cell.cell]],
+            displacement, rotates_};
 }
 
 const InternalForce::Shortened* InternalForce::shortened(int c) const {

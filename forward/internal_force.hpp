@@ -6,7 +6,6 @@
 #include "forward/uneven_cells.hpp"
 
 #include <array>
-#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -80,10 +79,8 @@ class InternalForce {
 
     struct Shortened {  // a cell that would be whole without slivers
         int cell;
-        double share;  // that is left of it
-        Vec2 middle;   // of that, in cells from the cell's lower left corner
+        Discretisation::Rest rest;
     };
-    std::optional<Shortened> rest_of_whole(int cell) const;
     const Shortened* shortened(int cell) const;  // null: it is none
     BilinearPiece rest_of(const Shortened& cell, const Eigen::Matrix3d& stiffness, const Vec2& moduli,
                           const std::vector<Vec2>& displacement) const;

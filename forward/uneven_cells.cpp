@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ranges>
 
 namespace crampfit {
 
@@ -28,50 +27,29 @@ void UnevenCells::sort() {
         if (history_ && history_->is_in(cell.cell)) continue;
         const int first = points.first_of_cell[cell.cell];
         const std::span<const Sliver> slivers = body_.slivers_of(cell.cell, cell.cell + 1);
-        const auto add = [&](int p, bool is_sliver, std::span<const int> node, const PointBox& box, double share, const Vec2& x) {
+        const auto add = [&](int p, bool is_sliver, std::span<const int> node, const PointBox& box, double share,
+                             const Vec2& middle) {
             const double of_cell = share * (box.to_x - box.from_x) * (box.to_y - box.from_y) / (side * side);
-            pieces_.push_back({cell.cell,
-                               p,
-                               is_sliver,
-                               {node[0], node[1], node[2], node[3]},
-                               box,
-                               of_cell,
-                               (x - body_.layout.cell_corner(cell.cell)).cwiseQuotient(body_.layout.cell),
-                               &wood_of(cell, box)});
+            pieces_.push_back(
+                {cell.cell, p, is_sliver, {node[0], node[1], node[2], node[3]}, box, of_cell, middle, &wood_of(cell, box)});
         };
-        const auto same = [&](int k) { return points.node.same(first, first + k); };
-        const auto places = std::views::iota(0, side * side);
-        if (!slivers.empty() && std::ranges::all_of(places, same)) {
-            const PointBox all{0, 0, side, side};
-            double rest = 1.0;
-            Vec2 middle = body_.layout.cell_corner(cell.cell) + 0.5 * body_.layout.cell;
-            for (const Sliver& sliver : slivers) {
-                rest -= sliver.share / (side * side);
-                middle -= sliver.share / (side * side) * sliver.position;
-            }
-            add(first, false, points.node[first], all, rest, middle / rest);
-            for (const Sliver& sliver : slivers) {
-                const int k = sliver.point - first;
-                add(sliver.point, true, sliver.node, {k % side, k / side, k % side + 1, k / side + 1}, sliver.share,
-                    sliver.position);
-            }
-            continue;
+        const auto in_cells = [&](const Vec2& x) -> Vec2 {
+            return (x - body_.layout.cell_corner(cell.cell)).cwiseQuotient(body_.layout.cell);
+        };
+        const auto rest = body_.rest_of_cell(cell.cell);
+        if (rest) add(first, false, points.node[first], {0, 0, side, side}, rest->share, rest->middle);
+        for (int k = 0; k < side * side && !slivers.empty(); ++k) {
+            const int p = first + k;
+            const PointBox box{k % side, k / side, k % side + 1, k / side + 1};
+            const auto sliver = std::ranges::find(slivers, p, &Sliver::point);
+            const bool is_cut = sliver != slivers.end();
+            const Vec2& middle = points.position[p];
+            if (!rest)
+                add(p, false, points.node[p], box, is_cut ? 1.0 - sliver->share : 1.0,
+                    in_cells(is_cut ? sliver->middle_of_rest(middle) : middle));
+            if (is_cut) add(p, true, sliver->node, box, sliver->share, in_cells(sliver->position));
         }
-        if (!slivers.empty()) {
-            for (int k = 0; k < side * side; ++k) {
-                const int p = first + k;
-                const PointBox box{k % side, k / side, k % side + 1, k / side + 1};
-                const auto sliver = std::ranges::find(slivers, p, &Sliver::point);
-                const Vec2& middle = points.position[p];
-                if (sliver == slivers.end()) {
-                    add(p, false, points.node[p], box, 1.0, middle);
-                } else {
-                    add(p, false, points.node[p], box, 1.0 - sliver->share, sliver->middle_of_rest(middle));
-                    add(p, true, sliver->node, box, sliver->share, sliver->position);
-                }
-            }
-            continue;
-        }
+        if (!slivers.empty()) continue;
         for (int start = 0; start < side * side; ++start) {
             // All points on the same fields, if they are a rectangle: else each by itself, so that a mirrored scene is cut alike.
             PointBox box{side, side, 0, 0};
@@ -86,8 +64,7 @@ void UnevenCells::sort() {
             const bool is_rectangle = count == (box.to_x - box.from_x) * (box.to_y - box.from_y);
             if (is_rectangle && start > least) continue;
             if (!is_rectangle) box = {start % side, start / side, start % side + 1, start / side + 1};
-            const Vec2 middle = body_.layout.cell_corner(cell.cell) +
-                                0.5 * Vec2(box.from_x + box.to_x, box.from_y + box.to_y).cwiseProduct(body_.layout.point_size());
+            const Vec2 middle = 0.5 / side * Vec2(box.from_x + box.to_x, box.from_y + box.to_y);
             add(first + start, false, points.node[first + start], box, 1.0, middle);
         }
     }
