@@ -75,16 +75,17 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
                      const std::filesystem::path& results) {
     const bool of_outputs = !study.outputs.empty();
     if (asks_for(request, DakotaRequest::hessian)) return "Hessians were asked for, and there are none";
+    const bool misfit = !of_outputs && request.active.size() == 1;
+    const std::size_t count = of_outputs ? output_count(study) : residual_count(study);
+    if (!misfit && count != request.active.size())
+        throw InputError(study.file.string(), of_outputs ? "outputs" : "residuals", std::to_string(count),
+                         fmt::format("must be as many as the functions that are asked for, which are {}{}", request.active.size(),
+                                     of_outputs ? "" : "; or ask for one, the sum of their squares"));
     const StudyFunction function =
         of_outputs ? output_function(study, &stop_requested()) : fit_function(study, &stop_requested());
     const Evaluation evaluation = function(point.values, common.threads);
     if (!evaluation.usable()) return evaluation.status;
     Eigen::VectorXd values = evaluation.residuals;
-    const bool misfit = !of_outputs && request.active.size() == 1;
-    if (!misfit && static_cast<std::size_t>(values.size()) != request.active.size())
-        throw InputError(study.file.string(), of_outputs ? "outputs" : "residuals", std::to_string(values.size()),
-                         fmt::format("must be as many as the functions that are asked for, which are {}{}", request.active.size(),
-                                     of_outputs ? "" : "; or ask for one, the sum of their squares"));
     Eigen::MatrixXd slopes;  // [functions x parameters]
     if (asks_for(request, DakotaRequest::gradient)) {
         const auto found = of_outputs ? output_slopes(study, point.values, &stop_requested())

@@ -83,8 +83,9 @@ ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& co
     write(fit, arguments.output);
     double of_runs = 0;
     for (const auto& run : fit.runs) of_runs += run.seconds;
-    report(common, fmt::format("{}: {}{} runs in {}, each by itself {} in all, saved as {}", name(fit.status), fit.message,
-                               fit.runs.size(), duration_text(fit.seconds), duration_text(of_runs), arguments.output.string()));
+    for (const std::string& sentence : sentences(fit.message)) report(common, sentence);
+    report(common, fmt::format("{} runs in {}, each by itself {} in all, saved as {}", fit.runs.size(),
+                               duration_text(fit.seconds), duration_text(of_runs), arguments.output.string()));
     print(table_text(fit));
     return exit_status(fit.status);
 }

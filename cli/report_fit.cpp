@@ -316,9 +316,12 @@ std::string runs_section(const Fit& fit) {
 
 std::string summary(const Fit& fit) {
     std::string markup;
-    if (!lack_of_fit(fit.checks).empty() || fit.status != FitStatus::converged)
-        markup += fmt::format("<p class=\"warning\">{}</p>\n", escaped(fit.message));
-    else markup += paragraph(fit.message);
+    const std::string lack = lack_of_fit(fit.checks);
+    for (const std::string& sentence : sentences(fit.message)) {
+        const bool is_end = markup.empty();  // how the fit ended comes first
+        const bool warns = is_end ? fit.status != FitStatus::converged : lack.find(sentence) != std::string::npos;
+        markup += warns ? fmt::format("<p class=\"warning\">{}</p>\n", escaped(sentence)) : paragraph(sentence);
+    }
     double seconds = 0;
     for (const FitRun& run : fit.runs) seconds += run.seconds;
     return markup + facts({{"Ended", name(fit.status)},

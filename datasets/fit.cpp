@@ -36,4 +36,15 @@ SimulatedPath together(const Fit& fit, const std::string& model) {
     return all;
 }
 
+std::vector<std::string> sentences(const std::string& message) {
+    const std::string end = ". ";
+    std::vector<std::string> found;
+    for (std::size_t from = 0; from < message.size();) {
+        const std::size_t next = std::min(message.find(end, from), message.size() - 1) + 1;  // behind the full stop
+        found.push_back(message.substr(from, next - from));
+        from = next + 1;
+    }
+    return found;
+}
+
 }  // namespace crampfit

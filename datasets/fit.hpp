@@ -97,8 +97,8 @@ struct PosteriorSample {
 /// What a fit gives.
 struct Fit {
     FitStatus status = FitStatus::converged;
-    std::string message;
-    std::string method;  // what did the work, and why it was chosen
+    std::string message;  // sentences for a person, a space after each
+    std::string method;   // what did the work, and why it was chosen
     std::vector<FittedParameter> parameters;
     Eigen::MatrixXd covariance;  // in the parameters' units
     Eigen::MatrixXd correlation;
@@ -119,5 +119,8 @@ struct Fit {
 
 /// How far the photographed paths of all experiments together are from those of a model; the cracks are left out.
 SimulatedPath together(const Fit& fit, const std::string& model);
+
+/// The sentences of a fit's message, each by itself.
+std::vector<std::string> sentences(const std::string& message);
 
 }  // namespace crampfit

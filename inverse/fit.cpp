@@ -310,6 +310,8 @@ StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 
+std::size_t residual_count(const Study& study) { return StudyModel(study, Forward(), 0.0, nullptr).residual_count(); }
+
 std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
     const KeptWalks walks(study);
     if (!walks.has_exact_slopes()) {

@@ -50,6 +50,9 @@ Fit fit_study(const Study& study, const FitOptions& options = {});
 /// be null. Throws as `fit_study` does.
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop = nullptr);
 
+/// How many they are. Throws as `fit_study` does.
+std::size_t residual_count(const Study& study);
+
 /// Their derivatives by the parameters. Absent where there are none, or a run failed.
 std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values,
                                           const std::atomic<bool>* stop = nullptr);

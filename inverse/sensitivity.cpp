@@ -297,6 +297,8 @@ StudyFunction output_function(const Study& study, const std::atomic<bool>* stop)
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 
+std::size_t output_count(const Study& study) { return OutputModel(study, Forward(), nullptr).names().size(); }
+
 std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
     const KeptWalks walks(study);
     const auto slopes = walks.has_exact_slopes() ? slopes_at(study, walks, values, stop) : std::nullopt;

@@ -46,10 +46,7 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
         left_out_.push_back(covered.remark);
     }
     comparisons_ = comparisons_at(model_resolution);
-    std::size_t stations = 0;
-    for (const Comparison& comparison : comparisons_) {
-        stations += comparison.stations().size();
-    }
+    const std::size_t stations = station_count();
     if (stations < study.parameters.size()) {
         throw InputError(study.file.empty() ? "study" : study.file.string(), "parameters",
                          std::to_string(study.parameters.size()),
@@ -169,6 +166,20 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
     }
     evaluation.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));
     evaluation.misfit = evaluation.residuals.squaredNorm();
+}
+
+std::size_t StudyModel::station_count() const {
+    std::size_t count = 0;
+    for (const Comparison& comparison : comparisons_) {
+        count += comparison.stations().size();
+    }
+    return count;
+}
+
+std::size_t StudyModel::residual_count() const {
+    const std::vector<Parameter>& parameters = box_.parameters();
+    const auto has_prior = [](const Parameter& parameter) { return parameter.prior.has_value(); };
+    return station_count() + static_cast<std::size_t>(std::count_if(parameters.begin(), parameters.end(), has_prior));
 }
 
 MeasuredCurves StudyModel::curves() const {

@@ -49,12 +49,14 @@ class StudyModel {
     double likely_resolution(const Evaluation& evaluation, double most) const;
 
     const UnitBox& box() const { return box_; }
+    std::size_t residual_count() const;  // of the data, and one a prior
     MeasuredCurves curves() const;
     std::vector<FitResidual> residuals(const Evaluation&) const;  // of a usable evaluation, without priors
     std::string remarks() const;                                  // on the data, for a person
 
   private:
     std::vector<Comparison> comparisons_at(double resolution) const;
+    std::size_t station_count() const;
 
     const Study& study_;
     std::vector<Experiment> tests_;      // with what runs can be compared with

@@ -126,7 +126,7 @@ TEST(SystemCommand, EvaluateGivesResidualsOrTheirSquaresSummed) {
     ASSERT_EQ(command.evaluate(request("90", "59.99", {1})).status, 0);
     const double less = command.numbers()[0];
     EXPECT_NEAR(misfit[1], (more - less) / 0.02, 1e-5 * std::abs(misfit[1]));
-    const Outcome wrong = command.evaluate(request("90", "60", {1, 1}));
+    const Outcome wrong = command.evaluate(request("90", "-60", {1, 1}));  // nothing has been run, or that would have failed
     EXPECT_EQ(wrong.status, 2);
     EXPECT_TRUE(contains(wrong.error, "must be as many as the functions")) << wrong.error;
 }

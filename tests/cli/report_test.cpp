@@ -1,4 +1,5 @@
 #include "datasets/io.hpp"
+#include "inverse/lack_of_fit.hpp"
 #include "tests/cli/command.hpp"
 #include "tests/cli/scenes.hpp"
 
@@ -53,7 +54,6 @@ std::string hostile_scene() {
 
 Fit small_fit() {
     Fit fit;
-    fit.message = "Converged.";
     fit.method = "Ceres, since derivatives are exact";
     fit.study_text = "title = \"E & G of a <block>\"\n";
     fit.parameters = {{.name = "E",
@@ -98,6 +98,7 @@ Fit small_fit() {
          {},
          {{"hoop stress", "no run ended well", {}}, {"straight", "finished", {straight}}}}};
     fit.checks = {{"pull", "force", 20, 0.8, 1, 0.9, 1e-5}, {"pull", "arrival", 20, 0, 1, 0, 0.5}};
+    fit.message = "Converged. " + lack_of_fit(fit.checks) + "pull: weight 1. ";
     fit.misfit = 5;
     fit.reduced_chi_square = 0.2;
     return fit;
@@ -152,7 +153,8 @@ TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
     write(small_fit(), command.path("fit.h5"));
     const std::string page = report(command, "fit.h5");
     EXPECT_TRUE(contains(page, "<title>E &amp; G of a &lt;block&gt;</title>"));
-    EXPECT_TRUE(contains(page, "class=\"warning\""));
+    EXPECT_TRUE(contains(page, "<p>Converged.</p>\n<p class=\"warning\">Lack of fit: the residuals of force of"));
+    EXPECT_TRUE(contains(page, "<p>pull: weight 1.</p>"));
     for (const char* part :
          {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack", "Profile of E",
           "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml -o fit.h5"})
