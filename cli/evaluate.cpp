@@ -113,11 +113,16 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
 
 ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& common) {
     check_output(arguments.results, {arguments.study, arguments.parameters});
-    const DakotaRequest request = read_dakota_request(arguments.parameters);
     const Study study = open_study(arguments.study, common);
     check_output(arguments.results, files_of(study));
-    const std::string failure =
-        evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
+    std::string failure;
+    try {
+        const DakotaRequest request = read_dakota_request(arguments.parameters);
+        failure = evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
+    } catch (const InputError& error) {  // no answer to an earlier question stays
+        write_dakota_failure(error.what(), arguments.results);
+        throw;
+    }
     if (failure.empty()) return ExitStatus::done;
     write_dakota_failure(failure, arguments.results);
     report(common, "failed: " + failure);

@@ -165,11 +165,15 @@ std::string summary(const Record& record) {
         rows.push_back({"Largest force", fmt::format("{:.4g} N at {:.4g} mm", peak->force, 1e3 * peak->displacement)});
         rows.push_back({"Crack length", fmt::format("from {:.4g} mm to {:.4g} mm", 1e3 * record.series.front().crack_length,
                                                     1e3 * record.series.back().crack_length)});
+        const Instant& last = record.series.back();
+        const double rest = last.external_work - last.fracture_energy - last.strain_energy - last.kinetic_energy;
         rows.push_back({"Work of the loading",
-                        fmt::format("{:.4g} mJ, of which {:.4g} mJ went into new crack faces",
-                                    1e3 * record.series.back().external_work, 1e3 * record.series.back().fracture_energy)});
+                        fmt::format("{:.4g} mJ, of which {:.4g} mJ went into new crack faces and {:.4g} mJ are strain energy",
+                                    1e3 * last.external_work, 1e3 * last.fracture_energy, 1e3 * last.strain_energy)});
+        if (rest > 0.01 * std::abs(last.external_work))
+            rows.push_back({"Neither", fmt::format("{:.4g} mJ: set free by jumps of the crack, or dissipated", 1e3 * rest)});
     }
-    rows.push_back({"Energy balance", fmt::format("work and energies differ by at most {:.2g} % of the largest",
+    rows.push_back({"Energy balance", fmt::format("that counted, work and energies differ by at most {:.2g} % of the largest",
                                                   100 * record.worst_energy_imbalance)});
     rows.push_back({"Cost", fmt::format("{} points, {} steps, {}", record.points, record.steps, duration_text(record.seconds))});
     return facts(rows);

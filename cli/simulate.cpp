@@ -36,7 +36,6 @@ Record run(const Scene& scene, const CommonOptions& common) {
     SimulateOptions options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();
-    options.threads = common.threads;
     options.progress = [&](const Progress& progress) {
         line.show(progress.fraction, progress.step,
                   fmt::format("at {:.4g} ms, crack {:.4g} mm", 1e3 * progress.time, 1e3 * progress.crack_length));

@@ -61,6 +61,13 @@ std::vector<Column> read_head(std::string_view line, std::size_t number, const s
     for (const ColumnKind& kind : column_kinds) {
         known.emplace_back(kind.name);
     }
+    for (const char other : {';', '\t'}) {
+        if (line.find(other) != std::string_view::npos) {
+            throw InputError(file, at_line("head", number), std::string(line),
+                             fmt::format("columns must be separated by commas, not {}, and decimals by points",
+                                         other == ';' ? "semicolons" : "tabs"));
+        }
+    }
     for (const std::string& field : split_fields(line)) {
         const Place place{file, at_line(fmt::format("column {}", columns.size() + 1), number)};
         const auto fail = [&](const std::string& rule) { throw InputError(place.file, place.key, field, rule); };

@@ -22,6 +22,9 @@ std::string read_text(const std::filesystem::path& file) {
     if (content.starts_with("\xEF\xBB\xBF")) {
         content.erase(0, 3);
     }
+    if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF")) {
+        throw InputError(file.string(), "", "", "is UTF-16 text: save it as UTF-8");
+    }
     return content;
 }
 

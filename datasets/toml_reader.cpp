@@ -138,6 +138,9 @@ std::string Entry::written() const {
     if (const auto text = node_->value_exact<std::string>()) {
         return *text;
     }
+    if (const auto number = node_->value_exact<double>()) {
+        return fmt::format("{}", *number);
+    }
     std::ostringstream out;
     node_->visit([&](const auto& node) { out << node; });
     const std::string whole = out.str();

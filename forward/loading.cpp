@@ -39,12 +39,16 @@ double end_time(const Scene& scene) {
 
 bool may_end(const Scene& scene) {
     if (std::isfinite(end_time(scene))) return true;
+    const bool is_loaded =
+        farthest_motion(scene, infinity) > 0.0 ||
+        std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
+        std::ranges::any_of(scene.bodies, [](const Body& body) { return !body.force.isZero(0.0); });
     const auto measured = [&](const auto& driver) { return driver.name == scene.measure.displacement; };
     const bool follows =
         std::ranges::any_of(scene.edges, [&](const Edge& edge) { return measured(edge) && edge.traction; }) ||
         std::ranges::any_of(scene.bodies, [&](const Body& body) { return measured(body) && (body.free[0] || body.free[1]); });
     const bool grows = std::ranges::any_of(scene.cracks, [](const Crack& crack) { return crack.grows != Growth::none; });
-    return (follows && scene.stop.displacement) || (grows && scene.stop.crack_length);
+    return (follows && scene.stop.displacement) || (grows && is_loaded && scene.stop.crack_length);
 }
 
 double farthest_motion(const Scene& scene, double end) {

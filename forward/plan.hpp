@@ -31,6 +31,7 @@ struct Plan {
         std::string part;
         std::string choice;
         std::string reason;
+        bool warns = false;  // also at the end of a run: hardly what the scene meant
     };
     std::vector<Choice> choices;  // for `crampfit explain`
 };

@@ -92,10 +92,15 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
                         Quasistatic& walk, Record& record) {
     constexpr double carries = 0.1;  // of the largest strain energy
     constexpr double counts = 0.02;
+    constexpr double nothing = 1e-10;  // of what the whole specimen would hold, strained as far
     const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
     const double most = std::max_element(record.series.begin(), record.series.end(), lower)->strain_energy;
     const auto last = std::find_if(record.series.rbegin(), record.series.rend(),
                                    [&](const Instant& row) { return row.strain_energy >= carries * most; });
+    double stiffest = 0.0;
+    for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
+    const double strain = last->displacement / scene.specimen.size.maxCoeff();
+    if (most <= nothing * stiffest * strain * strain * scene.specimen.size.prod() * scene.model.thickness) return;
     const SeriesPlace place{static_cast<std::size_t>(record.series.rend() - last - 1), 0.0};
     const auto power = [&](bool rotates) {
         Plan turned = plan;
@@ -128,6 +133,33 @@ void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSol
             fmt::format("; small strain: a tenth of the wood has turned by more than {:.2g} rad, see solver.strain = "
                         "\"finite rotation\"",
                         *at);
+}
+
+// How much wood there is straight ahead of a point [m].
+double wood_ahead(const Discretisation& body, const Vec2& x, const Vec2& direction) {
+    const double step = 0.5 * body.layout.point_size().minCoeff();
+    double ahead = step;  // a tip may lie at the root of a notch
+    while (body.point_at(x + ahead * direction) >= 0) ahead += step;
+    return ahead - step;
+}
+
+// Says so where an advance takes in most of the wood that there is, which is hardly meant.
+void judge_long_advance(const Scene& scene, const Discretisation& body, Record& record) {
+    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
+        const Crack& crack = scene.cracks[k];
+        for (const bool at_end : {false, true}) {
+            if (crack.grows != Growth::both && crack.grows != (at_end ? Growth::end : Growth::start)) continue;
+            const auto& points = crack.points;
+            const Vec2 tip = at_end ? points.back() : points.front();
+            const Vec2 before = at_end ? points[points.size() - 2] : points[1];
+            const double ahead = wood_ahead(body, tip, (tip - before).normalized());
+            if (ahead == 0.0 || crack.advance <= 0.5 * ahead) continue;
+            record.message +=
+                fmt::format("; cracks.{}.advance = {:.3g} mm takes in more than half of the {:.3g} mm of wood ahead: "
+                            "energy is balanced over it as a whole",
+                            k, 1e3 * crack.advance, 1e3 * ahead);
+        }
+    }
 }
 
 // Says so where an advance is so short that what it releases is the grid's say: it may pin a crack for good.
@@ -320,6 +352,9 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     Record record = !plan.quasistatic ? run_explicit(scene, plan, materials, body, options)
                     : plan.remembers  ? run_in_time(scene, plan, materials, body, options)
                                       : run_quasistatic(scene, plan, materials, body, options);
+    for (const Plan::Choice& choice : plan.choices)
+        if (choice.warns) record.message += fmt::format("; {}: {}", choice.part, choice.choice);
+    judge_long_advance(scene, body, record);
     end_at_sides(scene, record);
     judge_held_sides(scene, record);
     record.scene_text = scene.text;

@@ -124,9 +124,17 @@ class Tracer {
         std::size_t i = 0;
         while (true) {
             if (critical_[i] > end_time() || !std::isfinite(critical_[i])) {  // it stands to the end
-                stand(i, here, std::isfinite(end_time()) ? end_time() : now);
+                const double until = std::isfinite(end_time()) ? end_time() : plan_.still_from;
+                if (std::isfinite(until)) {
+                    if (!std::isfinite(sample_)) sample_ = until / scene_.output.samples;
+                    stand(i, here, std::max(now, until));
+                }
                 if (done_) return;
-                return walk_.station(i).split() ? split() : end(RunStatus::finished, "a stop condition was met");
+                if (walk_.station(i).split()) return split();
+                return end(RunStatus::finished, std::isfinite(end_time()) ? "a stop condition was met"
+                                                : std::isfinite(until)
+                                                    ? "all that moves stands still, and no stop condition can be met any more"
+                                                    : "no crack grows however far the load goes: no stop condition can be met");
             }
             if (i == 0) stand(0, here, critical_[0]);
             else go(here, moment(i, critical_[i]));

@@ -47,7 +47,8 @@ void UnevenCells::sort() {
             if (!rest)
                 add(p, false, points.node[p], box, is_cut ? 1.0 - sliver->share : 1.0,
                     in_cells(is_cut ? sliver->middle_of_rest(middle) : middle));
-            if (is_cut) add(p, true, sliver->node, box, sliver->share, in_cells(sliver->position));
+            // Of the only point of a cell a part is that cell's mean wood.
+            if (is_cut && side > 1) add(p, true, sliver->node, box, sliver->share, in_cells(sliver->position));
         }
         if (!slivers.empty()) continue;
         for (int start = 0; start < side * side; ++start) {

@@ -19,8 +19,10 @@ FitCheck check_curve(const FitResidual* begin, const FitResidual* end, double pa
         neighbours += row + 1 != end ? row->residual * (row + 1)->residual : 0.0;
     }
     const double freedom = std::max(1.0, n - parameters);
-    check.p_chi_square = boost::math::cdf(boost::math::complement(boost::math::chi_squared(freedom), check.chi_square));
-    check.autocorrelation = check.chi_square > 0 ? neighbours / check.chi_square : 0.0;
+    check.p_chi_square = std::isfinite(check.chi_square)
+                             ? boost::math::cdf(boost::math::complement(boost::math::chi_squared(freedom), check.chi_square))
+                             : 0.0;
+    check.autocorrelation = check.chi_square > 0 && std::isfinite(check.chi_square) ? neighbours / check.chi_square : 0.0;
     const double z = (check.autocorrelation + 1 / n) * std::sqrt(n);
     check.p_autocorrelation = boost::math::cdf(boost::math::complement(boost::math::normal(), z));
     return check;

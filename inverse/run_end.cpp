@@ -148,10 +148,75 @@ void cut_at_crack_length(const Experiment& test, const std::vector<double>& absc
         by_time ? "s" : "mm");
 }
 
+std::string data_file_of(const Experiment& test) {
+    return test.data_file.empty() ? "data of " + test.name : test.data_file.string();
+}
+
+// A crack that grew in the test needs one that may in the scene.
+void check_growth(const Experiment& test) {
+    const auto grows = [](const Crack& crack) { return crack.grows != Growth::none; };
+    if (std::ranges::any_of(test.scene.cracks, grows)) {
+        return;
+    }
+    double least = unbounded, most = -unbounded;
+    for (const double length : test.data.crack_length) {
+        least = std::isnan(length) ? least : std::min(least, length);
+        most = std::isnan(length) ? most : std::max(most, length);
+    }
+    if (most - least > clearly * test.noise.crack_length.value_or(0.0)) {
+        throw InputError(file_of(test), "cracks", test.scene.cracks.empty() ? "none" : "none that grows",
+                         fmt::format("the crack of {} grows, from {:g} to {:g} mm: give the scene one that does, or leave the "
+                                     "column out",
+                                     data_file_of(test), 1e3 * least, 1e3 * most));
+    }
+}
+
+// Wood that remembers was loaded as fast as the scene loads it. Of a soft machine the rate of the specimen is not known
+// beforehand.
+void check_rate(const Study& study, std::size_t experiment) {
+    constexpr double most_apart = 1.25;  // of the rates
+    const Experiment& test = study.experiments[experiment];
+    const std::optional<Drive> drive = measured_drive(test.scene);
+    const auto relaxes = [](const auto& wood) { return wood.second.viscoelastic.has_value(); };
+    const bool stiff = range_of(study, experiment, &Machine::compliance).high == 0.0;
+    const Curves& data = test.data;
+    if (!drive || !stiff || std::ranges::none_of(test.scene.materials, relaxes) || !is_measured(data.displacement) ||
+        !is_measured(data.time)) {
+        return;
+    }
+    std::optional<std::size_t> first, last;  // rows of both, up to where the scene's drive or the test comes to a stand
+    double farthest_row = 0;
+    for (const double u : data.displacement) {
+        farthest_row = std::isnan(u) ? farthest_row : std::max(farthest_row, u);
+    }
+    for (std::size_t i = 0; i < data.time.size(); ++i) {
+        if (std::isnan(data.time[i]) || std::isnan(data.displacement[i])) {
+            continue;
+        }
+        first = first ? first : i;
+        last = i;
+        if (data.displacement[i] > 0.9 * farthest_row) {
+            break;
+        }
+    }
+    if (!first) {
+        return;
+    }
+    const double went = data.displacement[*last] - data.displacement[*first], took = data.time[*last] - data.time[*first];
+    if (went > 0 && took > 0 && std::abs(std::log(went / took / drive->speed)) > std::log(most_apart)) {
+        throw InputError(
+            data_file_of(test), "time", fmt::format("{:.3g} mm in {:.3g} s", 1e3 * went, took),
+            fmt::format("{} goes {:.3g} mm in that time: its wood remembers, and has to be loaded as fast as in the test",
+                        file_of(test), 1e3 * drive->speed * took));
+    }
+}
+
 }  // namespace
 
 CoveredData covered_data(const Study& study, std::size_t experiment) {
     const Experiment& test = study.experiments[experiment];
+    check_growth(test);
+    check_rate(study, experiment);
     const Curves& data = test.data;
     const bool by_time = !is_measured(data.displacement);
     const std::vector<double>& abscissa = by_time ? data.time : data.displacement;

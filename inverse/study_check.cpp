@@ -22,6 +22,8 @@ std::string text(double value) { return fmt::format("{:g}", value); }
 
 void check_parameter(const Study& study, const Parameter& p, std::size_t index) {
     const std::string at = fmt::format("parameters.{}.", index);
+    const auto columns = {"misfit", "status", "seconds"};  // of the table of runs, beside the parameters
+    require(std::ranges::find(columns, p.name) == columns.end(), study, at + "name", p.name, "is the name of another column");
     require(!p.keys.empty(), study, at + "key", "absent", "a parameter needs a key of the scenes");
     require(std::isfinite(p.lower) && std::isfinite(p.upper) && p.lower < p.upper, study, at + "upper", text(p.upper),
             "must be above lower = " + text(p.lower));
@@ -77,6 +79,13 @@ void check_sensitivity_study(const Study& study) {
     check_one_model(study);
     require(!scenes_of(study).empty(), study, "scene", "none", "a sensitivity study needs a scene, or experiments with scenes");
     require(!study.outputs.empty(), study, "outputs", "none", "a sensitivity study needs outputs to look at");
+    for (const Scene* scene : scenes_of(study)) {
+        for (const StudyOutput& output : study.outputs) {
+            const double end = scene->stop.displacement.value_or(output.at);
+            require(output.at <= end * (1 + 1e-9), study, "outputs", output.name,
+                    fmt::format("no run comes there: stop.displacement is {:g} mm", 1e3 * end));
+        }
+    }
     require(!study.parameters.empty(), study, "parameters", "none", "a sensitivity study needs a parameter to vary");
     for (std::size_t i = 0; i < study.parameters.size(); ++i) {
         check_parameter(study, study.parameters[i], i);

@@ -59,6 +59,9 @@ TEST(UnitCurves, WhatIsWrongIsSaid) {
              {"force [N]\n1e999\n", "force, line 2", "finite number"},
              {"force [N],time [s]\n1,2,3\n", "row, line 2", "has 3 fields, but the head has 2 columns"},
              {"force [N],time [s]\n1\n", "row, line 2", "has 1 fields"},
+             {"time [s];force [N]\n1,5;2\n", "head, line 1", "separated by commas, not semicolons"},
+             {"time [s]\tforce [N]\n1\t2\n", "head, line 1", "separated by commas, not tabs"},
+             {std::string("\xFF\xFE", 2) + "f", "", "UTF-16"},
              {"force [N]\n", "", "has no data"},
              {"", "", "has no data"},
          }) {

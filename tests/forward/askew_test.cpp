@@ -106,6 +106,33 @@ TEST(UnitSliver, EachSideHasItsWood) {
     }
 }
 
+// Cells of two woods, 1 : 30, that a crack cuts, with one point each and with four: the cell's energy is never less than nothing.
+TEST(UnitSliver, APartOfTheOnlyPointOfACellIsItsMeanWood) {
+    for (int k = 0; k < 9; ++k) {
+        std::array<Instant, 2> ends;
+        for (const int points : {1, 4}) {
+            Scene scene = at_equilibrium(block({8e-3, 8e-3}, 0.5e-3));
+            scene.model.points_per_cell = points;
+            scene.specimen.rings = Rings{Vec2(-20e-3, 4e-3), 2.2e-3, 0.25, 0.0};
+            scene.specimen.material.clear();
+            scene.materials["EW"] = {40e6, 0.33, 300.0, 100.0};
+            scene.materials["LW"] = {1200e6, 0.33, 750.0, 150.0};
+            scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            Crack crack;
+            const double middle = 3.8e-3 + k * 0.075e-3;
+            crack.points = {Vec2(2.6e-3, middle - 0.43e-3), Vec2(5.4e-3, middle + 0.43e-3)};
+            scene.cracks = {crack};
+            scene.measure = {"top", "top"};
+            scene.stop.time = 1.0;
+            ends[points == 4] = simulate(scene).series.back();
+        }
+        std::printf("at %.3f mm: force %.3f, %.3f N, K_I %.0f, %.0f\n", 3.8 + k * 0.075, ends[0].force, ends[1].force,
+                    ends[0].K_I, ends[1].K_I);
+        EXPECT_NEAR(ends[0].force, ends[1].force, 0.003 * ends[1].force);
+        EXPECT_NEAR(ends[0].K_I, ends[1].K_I, 0.5 * ends[1].K_I);  // a band of latewood is a cell wide
+    }
+}
+
 // Of a crack that parts a thin arm, wherever it lies between points: a cubic takes the arm's bending.
 TEST(VerificationAskew, AnArmIsAsThickAsDrawn) {
     constexpr int places = 25;

@@ -131,6 +131,7 @@ TEST(VerificationWalk, AnAdvanceLongerThanTheSpecimenEnds) {
     scene.cracks[0].advance = 1e7;  // [m]
     const Record record = simulate(scene);
     EXPECT_EQ(record.status, RunStatus::split) << record.message;
+    EXPECT_NE(record.message.find("takes in more than half of the"), std::string::npos) << record.message;
 }
 
 TEST(VerificationWalk, AStripCracksAtTheExactDisplacement) {
@@ -394,6 +395,26 @@ TEST(UnitWalk, ACrackLengthAloneStopsIt) {
         EXPECT_NEAR(without.series.back().displacement, with.series.back().displacement, 0.01 * with.series.back().displacement)
             << grips;
     }
+}
+
+// Where the load comes to a stand before the crack is as long as that, the run goes on up to there; where nothing moves at all
+// none begins.
+TEST(UnitWalk, ALoadThatComesToAStandEndsARunWithoutAnotherEnd) {
+    Scene scene = rings_walk();
+    const Record whole = simulate(scene);
+    const double first = whole.series.front().crack_length;
+    scene.stop.displacement = displacement_at_length(whole, 1.001 * first) / 2;
+    const Record bounded = simulate(scene);
+    for (Edge& edge : scene.edges) edge.until = bounded.series.back().time;
+    scene.stop.displacement.reset();
+    scene.stop.crack_length = 9e-3;
+    const Record record = simulate(scene);
+    ASSERT_GE(record.series.size(), 100u) << record.message;
+    EXPECT_NEAR(record.series.back().force, bounded.series.back().force, 1e-9 * bounded.series.back().force);
+    EXPECT_NE(record.message.find("stands still"), std::string::npos) << record.message;
+    for (Edge& edge : scene.edges)
+        for (auto& v : edge.velocity) v = 0.0;
+    EXPECT_THROW(simulate(scene), InputError);
 }
 
 // Rows are some, about as many as asked for, however slow the load.

@@ -218,6 +218,27 @@ TEST(UnitWood, LayersLieAsTheEdgeInThePicture) {
     EXPECT_LT(sum / count, 1.0);  // as asked of orientations
 }
 
+// A slot right through carries load where wood on both sides has nodes in common, and only there is it told of. Cells of 0.1 mm
+// with two points a side, of which the slot takes all or a part.
+TEST(UnitWood, AVoidThatTheGridBridgesIsToldOf) {
+    int bridged = 0, parted = 0;
+    for (const double width : {0.06e-3, 0.12e-3, 0.16e-3, 0.2e-3, 0.26e-3})
+        for (int k = 0; k < 4; ++k) {
+            const double low = 0.4e-3 + k * 0.025e-3 + 0.001e-3, high = low + width;
+            Scene scene = block({1e-3, 1e-3}, 0.1e-3);
+            scene.specimen.cutouts = {Polygon{{Vec2(-1e-3, low), Vec2(2e-3, low), Vec2(2e-3, high), Vec2(-1e-3, high)}}};
+            scene.edges = {{"top", Side::top, {}, {0.0, 1e-6}, {}, {}}, {"bottom", Side::bottom, {}, {0.0, 0.0}, {}, {}}};
+            scene.measure = {"top", "top"};
+            scene.stop.displacement = 1e-6;
+            const Record record = simulate(scene);
+            const bool told = record.message.find("thin voids: bridged at") != std::string::npos;
+            EXPECT_EQ(told, std::abs(record.series.back().force) > 1e-9) << width << " " << low << ": " << record.message;
+            (told ? bridged : parted)++;
+        }
+    EXPECT_GE(bridged, 5);
+    EXPECT_GE(parted, 5);
+}
+
 // Of 1 mm x 1 mm the picture covers nine tenths, all, nothing.
 TEST(UnitWood, APictureBesideTheSpecimenIsToldOf) {
     Scene scene = two_woods(20, [](const Vec2& x) { return x.x() > 0.5e-3; });

@@ -101,6 +101,7 @@ inline Study wedge_study(const FakeWedge& wedge, double force_noise = 0, double 
     experiment.name = "wedge";
     experiment.scene.materials["EW"] = {40e6, 0.33, 300, 100};
     experiment.scene.materials["LW"] = {1200e6, 0.33, 900, 100};
+    experiment.scene.cracks.emplace_back().grows = Growth::end;
     experiment.data = measure(wedge(true_earlywood, true_latewood), force_noise, length_noise, seed);
     experiment.noise.force = force_noise > 0 ? force_noise : 0.1;
     experiment.noise.crack_length = length_noise > 0 ? length_noise : 1e-4;

@@ -168,6 +168,18 @@ TEST(SystemFit, WhatTheMachineTakesOfTheDisplacementDoesNotEndTheRunsEarlier) {
     EXPECT_NEAR(last - 1e-6 * experiment.data.force[666], 0.5e-3, 1e-6);
 }
 
+// Data of a crack that grows want one that may.
+TEST(UnitFit, ACrackThatGrewNeedsOneThatMay) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.experiments[0].scene.cracks[0].grows = Growth::none;
+    EXPECT_THROW(covered_data(study, 0), InputError);
+    for (double& length : study.experiments[0].data.crack_length) {
+        length = 2e-3;
+    }
+    EXPECT_NO_THROW(covered_data(study, 0));
+}
+
 class EveryMethod : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryMethod, GivesTheSameBitsForAnyNumberOfThreads) {

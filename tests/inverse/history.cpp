@@ -1,8 +1,10 @@
 // Numbers of wood that remembers, found again from curves made with them.
+#include "datasets/error.hpp"
 #include "datasets/io.hpp"
 #include "forward/simulate.hpp"
 #include "inverse/fit.hpp"
 #include "inverse/kept_walks.hpp"
+#include "inverse/run_end.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <fmt/format.h>
@@ -88,6 +90,34 @@ TEST(SystemHistory, APronySeriesIsFoundAgain) {
     std::printf("g %.4f, tau %.4f s\n", fit.parameters[0].value, fit.parameters[1].value);
     EXPECT_NEAR(fit.parameters[0].value, 0.3, 0.003);
     EXPECT_NEAR(fit.parameters[1].value, 2.0, 0.02);
+}
+
+// The same curve a hundred times as fast is another test; where the wood does not remember, it is the same.
+TEST(SystemHistory, WoodThatRemembersIsLoadedAsInTheTest) {
+    const TemporaryFolder folder;
+    const std::string relaxes = "kind = \"viscoelastic\"\nprony = [ { g = 0.3, k = 0.3, tau = \"2 s\" } ]";
+    const auto told = [&](const std::string& wood, double faster, const std::string& of_experiment) -> std::string {
+        folder.write("scene.toml", bar(wood, "0.5 s"));
+        std::string data = "time [s],displacement [mm],force [N]\n";
+        for (int i = 1; i <= 5; ++i) {
+            data += fmt::format("{},{},{}\n", 0.1 * i / faster, 0.01 * i, i);
+        }
+        folder.write("data.csv", data);
+        const Study study =
+            read_study(folder.write("study.toml", "[[experiments]]\nscene = \"scene.toml\"\ndata = \"data.csv\"\n" +
+                                                      of_experiment + parameter("E", "\"40 MPa\"", "\"10 MPa\"", "\"90 MPa\"")));
+        try {
+            covered_data(study, 0);
+            return "";
+        } catch (const InputError& error) {
+            return error.what();
+        }
+    };
+    EXPECT_EQ(told(relaxes, 1, ""), "");
+    EXPECT_NE(told(relaxes, 100, "").find("time = 0.04 mm in 0.004 s: "), std::string::npos) << told(relaxes, 100, "");
+    EXPECT_NE(told(relaxes, 0.5, ""), "");
+    EXPECT_EQ(told(relaxes, 100, "compliance = \"1 um/N\"\n"), "");
+    EXPECT_EQ(told("kind = \"isotropic\"", 100, ""), "");
 }
 
 TEST(SystemHistory, YieldStressAndHardeningAreFoundAgain) {

@@ -344,6 +344,13 @@ TEST(UnitSensitivity, RefusesStudiesWithNothingToLookAt) {
     study = output_study(SensitivityMethod::local, 0);
     study.scene.reset();
     expect_refused(study, "scene");
+    study = output_study(SensitivityMethod::local, 0);
+    study.scene->stop.displacement = 0.4e-3;
+    study.outputs = {{"force at 0.5 mm", StudyOutput::Kind::force_at, 0.5e-3}};
+    expect_refused(study, "outputs");
+    study = output_study(SensitivityMethod::local, 0);
+    study.parameters[0].name = "misfit";
+    expect_refused(study, "parameters.0.name");
 }
 
 TEST(SystemSensitivity, SaysWhatItsNumbersRestOnAndRefusesWhatDoesNotCount) {
