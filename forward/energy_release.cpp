@@ -481,12 +481,22 @@ Vec2 intensity_factors(const Discretisation& body, const CrackFields& cracks, co
     return 0.5 / body.layout.thickness * field.release().inverse() * sum;
 }
 
-// True where the cell that holds x is made of the wood at x alone.
+// True where the cell that holds x, on a line of the grid each that has it, is made of the wood at x alone. Grain that turns
+// within it is no other wood.
 bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const Vec2& x) {
     const Vec2 half = 0.5 * body.layout.cell;
-    const Vec2 centre = body.layout.cell_corner(body.layout.cell_at(x)) + half;
-    const double here = materials.at(x).plane_modulus();
-    return std::abs(materials.average(centre, half).plane_modulus() - here) < 1e-6 * here;
+    const Vec2 hair = 1e-6 * body.layout.cell;
+    const Eigen::Matrix3d here = materials.at(x).elasticity.stiffness();
+    const double same = (materials.orthotropic() ? 0.05 : 1e-6) * here.norm();
+    int last = -1;
+    for (const Vec2& side : {Vec2(-1.0, -1.0), Vec2(1.0, -1.0), Vec2(-1.0, 1.0), Vec2(1.0, 1.0)}) {
+        const int c = body.layout.cell_at(x + hair.cwiseProduct(side));
+        if (c == last) continue;
+        last = c;
+        const LocalWood average = materials.average(body.layout.cell_corner(c) + half, half);
+        if ((average.elasticity.stiffness() - here).norm() > same) return false;
+    }
+    return true;
 }
 
 }  // namespace

@@ -336,6 +336,40 @@ TEST(VerificationOrthotropicCrack, EqualConstantsRunAsIsotropicWood) {
     }
 }
 
+// Which of two ways tells G near other wood hangs on the wood of the cells at the tip, not on axes in which it is written: the
+// scene mirrored has the same. Tips on a line of the grid, on a node, and off both.
+TEST(VerificationOrthotropicCrack, GAmongRingsIsTheSameMirrored) {
+    struct Case {
+        double cell, pith, across;
+        Vec2 from, tip;
+    };
+    for (const Case& one : {Case{0.5e-3, 7.81391285e-3, 0.0, {0.0, 3.0357e-3}, {6e-3, 2.875e-3}},
+                            {1e-3, 7.15822923e-3, -1e-5, {3.0273186e-3, 5.5993699e-3}, {8e-3, 6e-3}},
+                            {0.5e-3, 4.9584818e-3, 0.0, {4.5250481e-3, 6.04794e-3}, {4.7570099e-3, 6.9892594e-3}}}) {
+        std::vector<TipLoad> loads;
+        for (const Vec2& sign : {Vec2(1.0, 1.0), Vec2(-1.0, 1.0), Vec2(1.0, -1.0)}) {
+            const Vec2 size(12e-3, 10e-3);
+            const auto image = [&](const Vec2& x) -> Vec2 { return 0.5 * size + sign.cwiseProduct(x - 0.5 * size); };
+            Scene scene = at_rest(size, one.cell);
+            const bool above = sign.y() > 0.0;
+            scene.edges = {moving("pulled", above ? Side::top : Side::bottom, Vec2(one.across, 1e-5).cwiseProduct(sign)),
+                           moving("held", above ? Side::bottom : Side::top, {0.0, 0.0})};
+            scene.measure = {"pulled", "pulled"};
+            scene.materials["EW"] = wood();
+            scene.materials["LW"] = wood({2000e6, 1000e6, 100e6, 0.45, 27.5e9, 0.4, 0.45});
+            scene.specimen.material.clear();
+            scene.specimen.rings = Rings{image(Vec2(-20e-3, one.pith)), 2.2e-3, 0.25, 0.0};
+            Crack crack;
+            crack.points = {image(one.from), image(one.tip)};
+            scene.cracks = {crack};
+            loads.push_back(AtRest(scene).load());
+        }
+        std::printf("tip at %.3f, %.3f mm: G %.4g, mirrored %.4g, %.4g J/m^2\n", 1e3 * one.tip.x(), 1e3 * one.tip.y(), loads[0].G,
+                    loads[1].G, loads[2].G);
+        for (const TipLoad& load : loads) EXPECT_NEAR(load.G, loads[0].G, 0.01 * loads[0].G);
+    }
+}
+
 TEST(VerificationOrthotropicCrack, GWhereTheGrainTurns) {
     // The pith lies 12 mm from the tip: the grain turns by a degree a cell, and G carries its turning explicitly.
     Scene scene = edge_crack(0.2e-3);
