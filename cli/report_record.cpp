@@ -159,6 +159,7 @@ std::string curves_section(const Record& record) {
 
 std::string summary(const Record& record) {
     std::vector<std::pair<std::string, std::string>> rows{{"Ended", fmt::format("{}: {}", name(record.status), record.message)}};
+    double rest = 0.0;  // of the work, in no column of the record [J]
     if (!record.series.empty()) {
         const auto peak =
             std::ranges::max_element(record.series, {}, [](const Instant& instant) { return std::abs(instant.force); });
@@ -166,15 +167,16 @@ std::string summary(const Record& record) {
         rows.push_back({"Crack length", fmt::format("from {:.4g} mm to {:.4g} mm", 1e3 * record.series.front().crack_length,
                                                     1e3 * record.series.back().crack_length)});
         const Instant& last = record.series.back();
-        const double rest = last.external_work - last.fracture_energy - last.strain_energy - last.kinetic_energy;
         rows.push_back({"Work of the loading",
                         fmt::format("{:.4g} mJ, of which {:.4g} mJ went into new crack faces and {:.4g} mJ are strain energy",
                                     1e3 * last.external_work, 1e3 * last.fracture_energy, 1e3 * last.strain_energy)});
-        if (rest > 0.01 * std::abs(last.external_work))
-            rows.push_back({"Neither", fmt::format("{:.4g} mJ: set free by jumps of the crack, or dissipated", 1e3 * rest)});
+        rest = last.external_work - last.fracture_energy - last.strain_energy - last.kinetic_energy;
+        if (rest <= 0.01 * std::abs(last.external_work)) rest = 0.0;
     }
-    rows.push_back({"Energy balance", fmt::format("that counted, work and energies differ by at most {:.2g} % of the largest",
-                                                  100 * record.worst_energy_imbalance)});
+    const std::string freed =
+        rest > 0.0 ? fmt::format(", but for {:.4g} mJ that jumps of the crack set free or that was dissipated", 1e3 * rest) : "";
+    rows.push_back({"Energy balance", fmt::format("work and energies differ by at most {:.2g} % of the largest{}",
+                                                  100 * record.worst_energy_imbalance, freed)});
     rows.push_back({"Cost", fmt::format("{} points, {} steps, {}", record.points, record.steps, duration_text(record.seconds))});
     return facts(rows);
 }

@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -336,14 +337,14 @@ bool is_slotted(const Discretisation& body, int p) {
 // cells are full.
 std::vector<std::vector<int>> pieces_around(const Discretisation& body, int i, int j, const std::vector<bool>& is_slotted) {
     const Layout& layout = body.layout;
-    const std::vector<int>& first = body.points.first_of_cell;
-    std::vector<int> rest;
-    for (const int c :
-         {layout.cell_index(i - 1, j - 1), layout.cell_index(i, j - 1), layout.cell_index(i - 1, j), layout.cell_index(i, j)})
-        for (int p = first[c]; p < first[c + 1]; ++p)
-            if (!is_slotted[p]) rest.push_back(p);
+    const std::array<int, 4> cells{layout.cell_index(i - 1, j - 1), layout.cell_index(i, j - 1), layout.cell_index(i - 1, j),
+                                   layout.cell_index(i, j)};
     std::vector<std::vector<int>> pieces;
-    if (static_cast<int>(rest.size()) == 4 * layout.per_side * layout.per_side) return pieces;
+    if (std::ranges::all_of(cells, [&](int c) { return body.cell_is_full(c); })) return pieces;
+    std::vector<int> rest;
+    for (const int c : cells)
+        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p)
+            if (!is_slotted[p]) rest.push_back(p);
     while (!rest.empty()) {
         std::vector<int> piece{rest.back()};
         rest.pop_back();
