@@ -62,7 +62,7 @@ std::vector<Column> read_head(std::string_view line, std::size_t number, const s
         known.emplace_back(kind.name);
     }
     for (const char other : {';', '\t'}) {
-        if (line.find(other) != std::string_view::npos) {
+        if (line.find(other) != std::string_view::npos && line.find(',') == std::string_view::npos) {
             throw InputError(file, at_line("head", number), std::string(line),
                              fmt::format("columns must be separated by commas, not {}, and decimals by points",
                                          other == ';' ? "semicolons" : "tabs"));

@@ -134,7 +134,7 @@ class Tracer {
                 return end(RunStatus::finished, std::isfinite(end_time()) ? "a stop condition was met"
                                                 : std::isfinite(until)
                                                     ? "all that moves stands still, and no stop condition can be met any more"
-                                                    : "no crack grows however far the load goes: no stop condition can be met");
+                                                    : "no crack grows under this load: no stop condition can be met");
             }
             if (i == 0) stand(0, here, critical_[0]);
             else go(here, moment(i, critical_[i]));

@@ -75,5 +75,6 @@ TEST(UnitCurves, WhatIsWrongIsSaid) {
             EXPECT_NE(error.rule.find(bad.phrase), std::string::npos) << error.what();
         }
     }
+    EXPECT_EQ(read_curves(folder.write("wide.csv", "time [s],\tforce [N]\n1,\t2\n")).force, std::vector<double>{2.0});
     EXPECT_THROW(read_curves(folder / "none.csv"), InputError);
 }
