@@ -350,21 +350,26 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
     return found;
 }
 
-Vec2 SlidingBody::push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
-    Vec2 total = Vec2::Zero();
+void SlidingBody::meet(const Vec2& moved, const std::vector<Vec2>& displacement) {
     sliding_now_ = 0.0;
     pushed_ = touches(moved, displacement);
     stored_energy_ = yield_energy_;
+    for (const Touch& touch : pushed_) {
+        stored_energy_ += touch.energy + touch.drag.energy;
+        sliding_now_ += touch.drag.dissipated;
+    }
+    if (friction_ > 0.0) sliding_now_ += taken_off(moved, displacement);
+}
+
+Vec2 SlidingBody::push(std::vector<Vec2>& force) const {
+    Vec2 total = Vec2::Zero();
     for (const Touch& touch : pushed_) {
         const Vec2 push = touch.force * touch.normal + touch.drag.force;
         for (const Hold& hold : holds(touch.facet))
             for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
                 force[body_.points.node[hold.point][k]] += hold.weight[k] * push;
         total += push;
-        stored_energy_ += touch.energy + touch.drag.energy;
-        sliding_now_ += touch.drag.dissipated;
     }
-    if (friction_ > 0.0) sliding_now_ += taken_off(moved, displacement);
     return total;
 }
 

@@ -38,8 +38,11 @@ class SlidingBody {
     const std::shared_ptr<LocalYield>& yield() const { return yield_; }  // null: it does not
     const Shape& shape() const { return shape_; }
 
-    /// Adds the contact forces to the nodes. `moved` is how far the body has gone [m]. Returns the force on the specimen [N].
-    Vec2 push(const Vec2& moved, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
+    /// Finds where it pushes on the specimen, `moved` so far [m].
+    void meet(const Vec2& moved, const std::vector<Vec2>& displacement);
+
+    /// Adds the contact forces of there to the nodes. Returns the force on the specimen [N].
+    Vec2 push(std::vector<Vec2>& force) const;
 
     /// A facet that the body pushes on.
     struct Touch {

@@ -172,7 +172,10 @@ void Equilibrium::find_forces() {
     potential_.reset();
     force_.assign(displacement_.size(), Vec2::Zero());
     reaction_.assign(boundary_.drivers(), Vec2::Zero());
-    points_energy_ = internal_force_.add_with_energy(displacement_, force_);
+    do_side_by_side(side_by_side_, sliding_.size() + 1, [&](std::size_t k) {
+        if (k > 0) sliding_[k - 1].meet(place_of(sliding_driver_[k - 1]), displacement_);
+        else points_energy_ = internal_force_.add_with_energy(displacement_, force_, side_by_side_);
+    });
     face_energy_ = face_dissipated_;
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
@@ -191,7 +194,7 @@ void Equilibrium::find_forces() {
     contact_energy_ = 0.0;
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
-        reaction_[driver] = sliding_[i].push(place_of(driver), displacement_, force_);
+        reaction_[driver] = sliding_[i].push(force_);
         contact_energy_ += sliding_[i].stored_energy() + sliding_[i].dissipated();
     }
     for (const Boundary::Tied& tie : boundary_.tied) {

@@ -54,14 +54,14 @@ std::vector<Equilibrium::Motion> Equilibrium::motions(const std::vector<std::vec
 
 Eigen::MatrixXd Equilibrium::yields_to(const Eigen::MatrixXd& loads) const {
     Eigen::MatrixXd step(equations_, loads.cols());
-    Eigen::MatrixXd yields = Eigen::MatrixXd::Zero(loads.rows(), loads.cols());
+    Eigen::MatrixXd yields(loads.rows(), loads.cols());
     for (Eigen::Index k = 0; k < loads.cols(); ++k)
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
             if (equation_[dof] >= 0) step(equation_[dof], k) = loads(dof, k);
     factor_.solve(step);
     for (Eigen::Index k = 0; k < loads.cols(); ++k)
         for (std::size_t dof = 0; dof < equation_.size(); ++dof)
-            if (equation_[dof] >= 0) yields(dof, k) = step(equation_[dof], k);
+            yields(dof, k) = equation_[dof] >= 0 ? step(equation_[dof], k) : 0.0;
     return yields;
 }
 

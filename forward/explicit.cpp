@@ -98,7 +98,8 @@ void ExplicitSolver::surface_forces() {
     for (std::size_t i = 0; i < sliding_.size(); ++i) {
         const int driver = sliding_driver_[i];
         const Vec2 gone = boundary_.moved(driver, time_ + (0.5 - lag()) * plan_.time_step, displacement_);
-        reaction_[driver] = sliding_[i].push(gone, displacement_, force_);
+        sliding_[i].meet(gone, displacement_);
+        reaction_[driver] = sliding_[i].push(force_);
         sliding_[i].settle(gone, displacement_);
         books_.work += plan_.time_step * reaction_[driver].dot(mean_velocity_of(driver, time_, time_ + plan_.time_step));
     }

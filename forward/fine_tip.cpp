@@ -238,9 +238,11 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, const TipWay& 
 // The one that has been solved with this crack, or one from whose crack it goes on, but for one that is in use: where there is
 // little room two boxes may be the same.
 std::shared_ptr<CutOut> FineTip::cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end,
-                                     const CutOut* in_use) {
+                                     const CutOut* in_use, const Woods& made) {
     auto found = kept_.end();
     std::shared_ptr<CutOutWood> wood;
+    for (const std::shared_ptr<CutOutWood>& one : made)
+        if (one->is(box, cell)) wood = one;
     for (auto one = kept_.begin(); one != kept_.end(); ++one) {
         if (!(*one)->wood()->is(box, cell)) continue;
         wood = (*one)->wood();
@@ -260,24 +262,53 @@ std::shared_ptr<CutOut> FineTip::cut(const Box& box, const Vec2& cell, const Cra
     return kept_.front();
 }
 
-// Each box with cells as they are and half as wide; none where nothing is missed.
-FineTip::Parts FineTip::parts_of(const TipPlace& place, const Equilibrium& equilibrium) {
+// The wood of boxes that is not kept.
+FineTip::Woods FineTip::make_woods(std::span<const TipBoxes* const> places) const {
+    std::vector<std::pair<Box, Vec2>> wanted;
+    const auto want = [&](const Box& box, const Vec2& cell) {
+        const auto is_kept = [&](const std::shared_ptr<CutOut>& one) { return one->wood()->is(box, cell); };
+        const auto is_wanted = [&](const auto& one) {
+            return one.first.low == box.low && one.first.high == box.high && one.second == cell;
+        };
+        if (std::ranges::none_of(kept_, is_kept) && std::ranges::none_of(wanted, is_wanted)) wanted.emplace_back(box, cell);
+    };
+    for (const TipBoxes* place : places) {
+        Vec2 cell = body_.layout.cell;
+        for (const Box& box : place->boxes) {
+            want(box, 0.5 * cell);  // most work first
+            want(box, cell);
+            cell *= 0.5;
+        }
+    }
+    Woods made(wanted.size());
+    do_side_by_side(side_by_side_, made.size(), [&](std::size_t k) {
+        made[k] = std::make_shared<CutOutWood>(scene_, materials_, wanted[k].first, wanted[k].second);
+    });
+    return made;
+}
+
+// Whether the grid misses something there.
+bool FineTip::counts(const TipPlace& place, const Equilibrium& equilibrium) const {
     const auto& [about, crack, at_end] = place;
     const CrackFields& cracks = equilibrium.cracks();
     const CrackLine& line = cracks.lines[crack];
     const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
                                .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
     const Box& outermost = about.boxes[0];
-    if (opening <= 0.0 || !stands_alone(scene_, body_.layout, cracks, crack, outermost, {}) ||
-        touches_itself(body_, outermost, equilibrium, crack) ||
-        is_pressed(scene_, body_, outermost, equilibrium, small_.free_bodies))
-        return {};
+    return opening > 0.0 && stands_alone(scene_, body_.layout, cracks, crack, outermost, {}) &&
+           !touches_itself(body_, outermost, equilibrium, crack) &&
+           !is_pressed(scene_, body_, outermost, equilibrium, small_.free_bodies);
+}
+
+// Each box with cells as they are and half as wide.
+FineTip::Parts FineTip::parts_of(const TipPlace& place, const CrackLine& line, const Woods& made) {
+    const auto& [about, crack, at_end] = place;
     Parts parts;
     Vec2 cell = body_.layout.cell;
     for (const Box& box : about.boxes) {
         for (std::vector<std::shared_ptr<CutOut>>* of : {&parts.coarse, &parts.fine}) {
             const Vec2 width = of == &parts.fine ? Vec2(0.5 * cell) : cell;
-            of->push_back(cut(box, width, line, crack, at_end, parts.fine.empty() ? nullptr : parts.fine.back().get()));
+            of->push_back(cut(box, width, line, crack, at_end, parts.fine.empty() ? nullptr : parts.fine.back().get(), made));
         }
         cell *= 0.5;
     }
@@ -285,12 +316,17 @@ FineTip::Parts FineTip::parts_of(const TipPlace& place, const Equilibrium& equil
 }
 
 std::vector<MissedEnergy> FineTip::missed(const std::vector<TipPlace>& places, const Equilibrium& equilibrium, bool with_slopes) {
+    std::vector<const TipBoxes*> counted;
+    for (const TipPlace& place : places)
+        if (counts(place, equilibrium)) counted.push_back(&place.boxes);
+    const Woods made = make_woods(counted);
     std::vector<Parts> parts;
     std::set<const CutOutWood*> woods;
     std::size_t count = 0;
     for (const TipPlace& place : places) {
         std::set<const CutOutWood*> own;
-        parts.push_back(parts_of(place, equilibrium));
+        const bool is_counted = std::ranges::find(counted, &place.boxes) != counted.end();
+        parts.push_back(is_counted ? parts_of(place, equilibrium.cracks().lines[place.crack], made) : Parts());
         for (const auto* of : {&parts.back().coarse, &parts.back().fine})
             for (const auto& part : *of) own.insert(part->wood().get());
         count += own.size();
@@ -324,9 +360,13 @@ MissedEnergy FineTip::missed(const TipPlace& tip, const Parts& parts, const Equi
     std::vector<GridView> views{{body_, cracks, displacement, Vec2::Zero(), crack}};
     MissedEnergy missed;
     for (std::size_t k = 0; k < fine.size(); ++k) {
-        // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
-        if (!coarse[k]->solve(line, crack, at_end, views[k], !rotates_ || k > 0)) return {};
-        if (!fine[k]->solve(line, crack, at_end, views[k], false)) return {};
+        std::array<bool, 2> good{};
+        do_side_by_side(side_by_side_, 2, [&](std::size_t other) {
+            // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
+            good[other] = other ? coarse[k]->solve(line, crack, at_end, views[k], !rotates_ || k > 0)
+                                : fine[k]->solve(line, crack, at_end, views[k], false);
+        });
+        if (!good[0] || !good[1]) return {};
         const double held = fine[k]->potential(), of = coarse[k]->potential();
         const auto within = [&](double least, double most) { return held >= least * of && held <= most * of; };
         if (!within(far_below_coarse, far_above_coarse)) return {};
@@ -340,9 +380,14 @@ MissedEnergy FineTip::missed(const TipPlace& tip, const Parts& parts, const Equi
     missed.by_number.assign(numbers_.size(), 0.0);
     std::vector<Vec2> slope;  // of the innermost nothing is cut out
     for (std::size_t k = fine.size(); k-- > 0;) {
-        slope = fine[k]->slope_by(views[k], slope, place.share, missed.by_number);
-        const std::vector<Vec2> less = coarse[k]->slope_by(views[k], {}, -place.share, missed.by_number);
+        std::vector<Vec2> less;
+        std::vector<double> less_by_number(numbers_.size(), 0.0);
+        do_side_by_side(side_by_side_, 2, [&](std::size_t other) {
+            if (other) less = coarse[k]->slope_by(views[k], {}, -place.share, less_by_number);
+            else slope = fine[k]->slope_by(views[k], slope, place.share, missed.by_number);
+        });
         for (std::size_t f = 0; f < slope.size(); ++f) slope[f] -= less[f];
+        for (std::size_t n = 0; n < numbers_.size(); ++n) missed.by_number[n] += less_by_number[n];
     }
     double moment = 0.0;
     for (std::size_t f = 0; f < slope.size(); ++f) {

@@ -67,9 +67,12 @@ class FineTip {
     struct Parts {
         std::vector<std::shared_ptr<CutOut>> coarse, fine;  // [boxes]
     };
+    using Woods = std::vector<std::shared_ptr<CutOutWood>>;
+    Woods make_woods(std::span<const TipBoxes* const> places) const;
     std::shared_ptr<CutOut> cut(const Box& box, const Vec2& cell, const CrackLine& line, int crack, bool at_end,
-                                const CutOut* in_use);
-    Parts parts_of(const TipPlace& place, const Equilibrium& equilibrium);
+                                const CutOut* in_use, const Woods& made);
+    bool counts(const TipPlace& place, const Equilibrium& equilibrium) const;
+    Parts parts_of(const TipPlace& place, const CrackLine& line, const Woods& made);
     MissedEnergy missed(const TipPlace& tip, const Parts& parts, const Equilibrium& equilibrium, bool with_slopes) const;
 
     const Scene& scene_;

@@ -3,6 +3,7 @@
 #include "forward/deformation.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace crampfit {
 
@@ -563,13 +564,13 @@ void InternalForce::add(const std::vector<Vec2>& displacement, std::vector<Vec2>
     });
 }
 
-double InternalForce::add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const {
-    double sum = 0.0;
-    for (int strip = 0; strip < strips_.count(); ++strip) {
-        sum += visit(strip, OwnWood{body_}, displacement, Wanted::both, &force);
-        sum += visit_remembering(remembering_of(strip), displacement, Wanted::both, &force);
-    }
-    return sum;
+double InternalForce::add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, bool side_by_side) const {
+    std::vector<double> energy(strips_.count());
+    strips_.each(side_by_side, [&](int strip) {
+        energy[strip] = visit(strip, OwnWood{body_}, displacement, Wanted::both, &force) +
+                        visit_remembering(remembering_of(strip), displacement, Wanted::both, &force);
+    });
+    return std::accumulate(energy.begin(), energy.end(), 0.0);
 }
 
 double InternalForce::add_slope(const MaterialSlope& number, const std::vector<Vec2>& displacement,

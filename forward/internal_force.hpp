@@ -43,8 +43,8 @@ class InternalForce {
 
     void add(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, Team& team) const;
 
-    /// On one thread. Returns the energy too [J].
-    double add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
+    /// Returns the energy too [J].
+    double add_with_energy(const std::vector<Vec2>& displacement, std::vector<Vec2>& force, bool side_by_side = false) const;
 
     /// Adds what the slope of the wood by a number of the materials makes of the forces, and returns what it makes of the energy
     /// [per the number's unit]. Where no wood remembers.

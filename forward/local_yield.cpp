@@ -38,10 +38,16 @@ struct LocalYield::Solved {
     // Slope of the compliance by the numbers: -U^T K' U, where U are the displacements of unit forces.
     void add_slopes(const std::vector<MaterialSlope>& numbers, double sign, std::vector<Eigen::MatrixXd>& by_number) {
         const std::vector<MaterialSlope>& here = cut.slopes_by(numbers);
-        const Eigen::MatrixXd states = equilibrium->yields_to(loads);
+        Eigen::MatrixXd states(loads.rows(), loads.cols());
         constexpr Eigen::Index together = 16;  // stations
-        for (Eigen::Index first = 0; first < states.cols(); first += together) {
-            const Eigen::Index count = std::min(together, states.cols() - first);
+        const auto for_some = [&](const auto& visit) {
+            for (Eigen::Index first = 0; first < states.cols(); first += together)
+                visit(first, std::min(together, states.cols() - first));
+        };
+        for_some([&](Eigen::Index first, Eigen::Index count) {
+            states.middleCols(first, count) = equilibrium->yields_to(loads.middleCols(first, count));
+        });
+        for_some([&](Eigen::Index first, Eigen::Index count) {
             std::vector<Eigen::MatrixXd> pulls(here.size(), Eigen::MatrixXd(states.rows(), count));
             for (Eigen::Index k = 0; k < count; ++k) {
                 std::vector<Vec2> displacement(fields());
@@ -52,7 +58,7 @@ struct LocalYield::Solved {
             }
             for (std::size_t n = 0; n < here.size(); ++n)
                 by_number[n].middleCols(first, count) -= sign * (states.transpose() * pulls[n]);
-        }
+        });
     }
 
     CutOutWood cut;

@@ -465,9 +465,9 @@ bool Quasistatic::find(std::size_t number, int time) {
     if (good) {
         if (!scene_.output.probes.places.empty()) equilibrium_.refine();
         place.known[time] = known_here(time);
-        const Seen seen = boxes_about(number);
-        seek_slopes(number, time, seen);
-        keep(number, time, load_state(missed_in(seen, fine_tip_, equilibrium_, false)));
+        Missed missed = missed_in(boxes_about(number), fine_tip_, equilibrium_, !numbers_.empty());
+        keep(number, time, load_state(missed));
+        seek_slopes(number, time, std::move(missed));
         keep_probes(number, time);
         return true;
     }

@@ -147,7 +147,6 @@ class Quasistatic {
 
         Discretisation body;
         Equilibrium equilibrium;
-        FineTip fine_tip;
         const Place* entered = nullptr;
     };
 
@@ -188,7 +187,7 @@ class Quasistatic {
     void keep_slopes(std::size_t number, int time, Slopes slopes);
     void take_off_grid_error(std::vector<Vec2>& probes, const std::vector<Vec2>& wide) const;
     bool know_slopes(std::size_t number, int time);
-    void seek_slopes(std::size_t number, int time, Seen seen);
+    void seek_slopes(std::size_t number, int time, Missed missed);
     bool goes_with_load(const Equilibrium& equilibrium, const std::vector<Vec2>& drivers) const;
     std::optional<Slopes> slopes_at(Equilibrium& equilibrium, const Discretisation& body, const Missed& missed) const;
     void add_slopes(const Equilibrium& equilibrium, const Missed& missed, const Equilibrium::Slopes& slope,

@@ -30,8 +30,7 @@ std::optional<double> multiple(const std::vector<Vec2>& wanted, const std::vecto
 }  // namespace
 
 Quasistatic::Beside::Beside(const Quasistatic& walk)
-    : body(walk.scene_, walk.materials_), equilibrium(walk.scene_, walk.plan_, walk.materials_, body, 1, &walk.equilibrium_),
-      fine_tip(walk.scene_, walk.plan_, walk.materials_, body, walk.numbers_) {}
+    : body(walk.scene_, walk.materials_), equilibrium(walk.scene_, walk.plan_, walk.materials_, body, 1, &walk.equilibrium_) {}
 
 void Quasistatic::Beside::enter(const Place& place) {
     if (std::exchange(entered, &place) != &place) equilibrium.restore(*place.snapshot);
@@ -215,15 +214,15 @@ void Quasistatic::shift(const std::vector<double>& by) {
 
 // The derivatives of most equilibria will be asked for. So they are found as the walk goes on to the next ones, in the order in
 // which these were found: the same bits in a thread of their own or not.
-void Quasistatic::seek_slopes(std::size_t number, int time, Seen seen) {
+void Quasistatic::seek_slopes(std::size_t number, int time, Missed missed) {
     if (numbers_.empty()) return;
     Place& place = places_[number];
     const auto found = std::make_shared<std::optional<Slopes>>();
-    const auto find = [this, &place = std::as_const(place), &known = place.known.at(time), seen = std::move(seen), found] {
+    const auto find = [this, &place = std::as_const(place), &known = place.known.at(time), missed = std::move(missed), found] {
         if (!beside_) beside_ = std::make_unique<Beside>(*this);
         beside_->enter(place);
         beside_->equilibrium.set_displacements(known.displacement, time_of(known.time), known.contacts);
-        *found = slopes_at(beside_->equilibrium, beside_->body, missed_in(seen, beside_->fine_tip, beside_->equilibrium, true));
+        *found = slopes_at(beside_->equilibrium, beside_->body, missed);
     };
     place.sought[time] = {jobs_.add(find), found};
 }

@@ -1,19 +1,26 @@
 #pragma once
 
 #include <cstddef>
-#include <future>
-#include <vector>
 
 namespace crampfit {
 
-/// Does job(0) .. job(count - 1), each in a thread of its own, or one after the other. Throws what a job throws.
+namespace detail {
+
+using Job = void (*)(const void* job, std::size_t k);
+void share_out(std::size_t count, Job call, const void* job);
+
+}  // namespace detail
+
+/// Does job(0) .. job(count - 1), the first in this thread and others in threads that are free, or one after the other. Jobs may
+/// themselves call this. Throws what the first of them throws that does.
 template <class Job>
 void do_side_by_side(bool side_by_side, std::size_t count, const Job& job) {
-    std::vector<std::future<void>> others;
-    for (std::size_t k = 1; k < count; ++k)
-        others.push_back(std::async(side_by_side ? std::launch::async : std::launch::deferred, [&job, k] { job(k); }));
-    if (count > 0) job(0);
-    for (std::future<void>& other : others) other.get();
+    if (side_by_side && count > 1) {
+        detail::share_out(
+            count, [](const void* work, std::size_t k) { (*static_cast<const Job*>(work))(k); }, &job);
+    } else {
+        for (std::size_t k = 0; k < count; ++k) job(k);
+    }
 }
 
 }  // namespace crampfit

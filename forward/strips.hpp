@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/discretisation.hpp"
+#include "forward/side_by_side.hpp"
 #include "forward/team.hpp"
 
 namespace crampfit {
@@ -19,6 +20,19 @@ class Strips {
     template <class Job>
     void each(Team& team, const Job& job) const {
         for (const int turn : {0, 1}) team.each((count() + 1 - turn) / 2, [&](int i) { job(2 * i + turn); });
+    }
+
+    template <class Job>
+    void each(bool side_by_side, const Job& job) const {
+        constexpr int parts = 4;           // of a turn: more than threads that are free as a rule, as one may come late
+        constexpr int least_cells = 2000;  // that are worth waking another thread
+        for (const int turn : {0, 1}) {
+            const int strips = (count() + 1 - turn) / 2;
+            do_side_by_side(side_by_side && cells_ >= least_cells, parts, [&](std::size_t part) {
+                const int k = static_cast<int>(part);
+                for (int i = k * strips / parts; i < (k + 1) * strips / parts; ++i) job(2 * i + turn);
+            });
+        }
     }
 
   private:

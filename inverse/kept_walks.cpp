@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <deque>
 #include <list>
+#include <map>
 #include <mutex>
 #include <set>
 
@@ -102,7 +103,7 @@ class KeptWalks::Store {
 
     bool only_toughness() const {
         return others_.empty() && std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) {
-                   return KeptWalk(*scene).reusable() && !turns_with_toughness(*scene);
+                   return kind_of(*scene).reusable && !turns_with_toughness(*scene);
                });
     }
 
@@ -126,14 +127,12 @@ class KeptWalks::Store {
 
     bool has_slopes() const {
         return std::all_of(others_.begin(), others_.end(), is_of_wood) &&
-               std::all_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) { return KeptWalk(*scene).has_slopes(); });
+               std::all_of(scenes_.begin(), scenes_.end(), [&](const Scene* scene) { return kind_of(*scene).has_slopes; });
     }
 
     bool depend_on_order() const {
-        return std::any_of(scenes_.begin(), scenes_.end(), [](const Scene* scene) {
-            const KeptWalk walk(*scene);
-            return walk.reusable() && !walk.linear();
-        });
+        return std::any_of(scenes_.begin(), scenes_.end(),
+                           [&](const Scene* scene) { return kind_of(*scene).reusable && !kind_of(*scene).linear; });
     }
 
     bool has_exact_slopes() const {
@@ -169,10 +168,24 @@ class KeptWalks::Store {
         std::function<void()> work;
     };
 
+    struct Kind {  // of a scene's walks
+        bool reusable, linear, has_slopes;
+    };
+
     struct Entry {
         std::string name;
         std::shared_ptr<KeptWalk> walk;  // null: not needed yet
     };
+
+    const Kind& kind_of(const Scene& scene) const {
+        const std::lock_guard lock(mutex_);
+        const auto known = kinds_.find(&scene);
+        if (known != kinds_.end()) {
+            return known->second;
+        }
+        const KeptWalk walk(scene);
+        return kinds_[&scene] = {walk.reusable(), walk.linear(), walk.has_slopes()};
+    }
 
     Record run(const Scene& base, const Scene& scene, bool rough, const std::atomic<bool>* stop) {
         SimulateOptions options;
@@ -324,7 +337,8 @@ class KeptWalks::Store {
     std::vector<const Scene*> scenes_;
     std::vector<Setting> toughness_, others_;
     bool walks_tell_all_ = true;  // two points with the same walk of one scene have the same walks, and differ by toughness alone
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
+    mutable std::map<const Scene*, Kind> kinds_;
     std::deque<Entry> walks_;
     std::list<Work> put_off_;
 };

@@ -1,10 +1,12 @@
 #include "forward/job_queue.hpp"
+#include "forward/side_by_side.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -55,6 +57,40 @@ TEST(UnitJobQueue, DropsWhatIsNotBegun) {
         }
         EXPECT_LT(done, beside ? count : 1);
     }
+}
+
+// Jobs share out jobs of their own, more than there are threads, from several threads at a time.
+TEST(UnitSideBySide, EachJobIsDoneOnce) {
+    constexpr std::size_t callers = 3, outer = 5, inner = 7, rounds = 50;
+    std::vector<std::atomic<int>> done(callers * outer * inner);
+    {
+        std::vector<std::jthread> threads;
+        for (std::size_t caller = 0; caller < callers; ++caller)
+            threads.emplace_back([&, caller] {
+                for (std::size_t round = 0; round < rounds; ++round)
+                    do_side_by_side(caller != 1, outer, [&](std::size_t i) {
+                        do_side_by_side(true, inner, [&](std::size_t j) { ++done[(caller * outer + i) * inner + j]; });
+                    });
+            });
+    }
+    for (const std::atomic<int>& times : done) EXPECT_EQ(times, static_cast<int>(rounds));
+}
+
+TEST(UnitSideBySide, ThrowsWhatTheFirstOfItsJobsThrows) {
+    for (const bool side_by_side : {false, true})
+        for (int round = 0; round < 50; ++round) {
+            std::atomic<int> begun = 0;
+            try {
+                do_side_by_side(side_by_side, 6, [&](std::size_t k) {
+                    ++begun;
+                    if (k >= 2) throw std::runtime_error(std::to_string(k));
+                });
+                FAIL() << "nothing thrown";
+            } catch (const std::runtime_error& error) {
+                EXPECT_STREQ(error.what(), "2");
+            }
+            EXPECT_EQ(begun, side_by_side ? 6 : 3);
+        }
 }
 
 }  // namespace
