@@ -453,6 +453,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
            !materials.homogeneous()  ? "band widths do not round to points; J carries the material-gradient term"
            : materials.orthotropic() ? "one radial direction"
                                      : "no orientation");
+    const SpecimenPlan& specimen = scene.specimen;
+    if (!materials.orthotropic() &&
+        (specimen.radial || specimen.pith || (specimen.picture && !specimen.picture->orientation.empty())))
+        choose("radial direction", "not used", "all wood is isotropic");
     choose_wood_unseen(scene, plan, materials, body);
     if (const auto voids = thin_voids(scene, body)) plan.choices.push_back(*voids);
     choose_history(scene, plan, materials, body);
