@@ -378,9 +378,11 @@ void SegmentOptions::validate() const {
         const std::string text = fmt::format("{} {}-{}", range.material, range.low, range.high);
         require(range.low >= 0 && range.low <= range.high && range.high <= 255, "--gray", text,
                 "must be 0 <= low <= high <= 255");
-        for (const GrayClass& other : gray)
-            require(&other == &range || range.high < other.low || other.high < range.low, "--gray", text,
-                    "ranges must not overlap");
+        for (const GrayClass& other : gray) {
+            if (&other == &range) continue;
+            require(range.high < other.low || other.high < range.low, "--gray", text, "ranges must not overlap");
+            require(range.material != other.material, "--gray", text, "a class must have one range");
+        }
     }
 }
 

@@ -80,6 +80,8 @@ TEST(UnitSegment, ClassesByGivenGrays) {
     EXPECT_EQ(label(75), Specimen::void_label);
     options.gray = {{"dark", 80, 160}, {"bright", 150, 255}};
     EXPECT_THROW(segment_pixels(pixels, options), InputError);
+    options.gray = {{"dark", 80, 120}, {"dark", 150, 255}};
+    EXPECT_THROW(options.validate(), InputError);
     options.gray = {{"dark", 80, 256}};
     EXPECT_THROW(segment_pixels(pixels, options), InputError);
 }
