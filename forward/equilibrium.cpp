@@ -56,7 +56,7 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
     : scene_(scene), plan_(plan), body_(body), materials_(materials),
       cracks_(scene, body, materials, least_freed_at_rest, plan.cuts_domains), boundary_(scene, body, cracks_, &materials),
       gauges_(scene), history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
-      internal_force_(body, materials, plan.rotates, history_.get()), side_by_side_(threads > 1),
+      internal_force_(body, materials, plan.rotates, history_.get()), side_by_side_(have_threads(threads)),
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;

@@ -4,6 +4,7 @@
 #include "forward/side_by_side.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <span>

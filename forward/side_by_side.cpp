@@ -8,13 +8,13 @@
 #include <thread>
 #include <vector>
 
-namespace crampfit::detail {
+namespace crampfit {
 
 namespace {
 
 struct Batch {
     std::size_t count;
-    Job call;
+    detail::Job call;
     const void* job;
     std::size_t next = 1, done = 0;  // of all; the first is the caller's
     std::condition_variable all_done = {};
@@ -25,20 +25,20 @@ struct Batch {
 // Threads that stay: most jobs take less time than a thread that starts and fetches its memory from the system.
 class Pool {
   public:
-    Pool() {
-        const unsigned cores = std::max(2u, std::thread::hardware_concurrency());
-        for (unsigned i = 1; i < cores; ++i) others_.emplace_back([this] { follow(); });
-    }
-
     ~Pool() {
         const std::lock_guard lock(mutex_);
         over_ = true;
         added_.notify_all();
     }
 
+    void have(int threads) {
+        const std::lock_guard lock(mutex_);
+        while (static_cast<int>(others_.size()) + 1 < threads) others_.emplace_back([this] { follow(); });
+    }
+
     // What no other thread has begun when the caller is done with the first is the caller's too, so that no batch waits for one
     // that waits for it.
-    void share_out(std::size_t count, Job call, const void* job) {
+    void share_out(std::size_t count, detail::Job call, const void* job) {
         Batch batch{count, call, job};
         std::unique_lock lock(mutex_);
         waiting_.push_back(&batch);
@@ -86,11 +86,18 @@ class Pool {
     std::vector<std::jthread> others_;
 };
 
-}  // namespace
-
-void share_out(std::size_t count, Job call, const void* job) {
-    static Pool pool;
-    pool.share_out(count, call, job);
+Pool& pool() {
+    static Pool all;
+    return all;
 }
 
-}  // namespace crampfit::detail
+}  // namespace
+
+bool have_threads(int threads) {
+    if (threads > 1) pool().have(threads);
+    return threads > 1;
+}
+
+void detail::share_out(std::size_t count, Job call, const void* job) { pool().share_out(count, call, job); }
+
+}  // namespace crampfit

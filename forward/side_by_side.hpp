@@ -11,6 +11,10 @@ void share_out(std::size_t count, Job call, const void* job);
 
 }  // namespace detail
 
+/// Lets so many threads share what is done side by side, the caller's own among them, where fewer have. Whether they are more
+/// than one.
+bool have_threads(int threads);
+
 /// Does job(0) .. job(count - 1), the first in this thread and others in threads that are free, or one after the other. Jobs may
 /// themselves call this. Throws what the first of them throws that does.
 template <class Job>

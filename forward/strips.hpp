@@ -22,6 +22,7 @@ class Strips {
         for (const int turn : {0, 1}) team.each((count() + 1 - turn) / 2, [&](int i) { job(2 * i + turn); });
     }
 
+    /// The same in threads that are free.
     template <class Job>
     void each(bool side_by_side, const Job& job) const {
         constexpr int parts = 4;           // of a turn: more than threads that are free as a rule, as one may come late

@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -63,6 +65,7 @@ TEST(UnitJobQueue, DropsWhatIsNotBegun) {
 TEST(UnitSideBySide, EachJobIsDoneOnce) {
     constexpr std::size_t callers = 3, outer = 5, inner = 7, rounds = 50;
     std::vector<std::atomic<int>> done(callers * outer * inner);
+    have_threads(3);
     {
         std::vector<std::jthread> threads;
         for (std::size_t caller = 0; caller < callers; ++caller)
@@ -76,7 +79,25 @@ TEST(UnitSideBySide, EachJobIsDoneOnce) {
     for (const std::atomic<int>& times : done) EXPECT_EQ(times, static_cast<int>(rounds));
 }
 
+TEST(UnitSideBySide, NoMoreThreadsTakePartThanAskedFor) {
+    constexpr int asked = 9;  // more than any other test of this program
+    EXPECT_FALSE(have_threads(1));
+    EXPECT_TRUE(have_threads(asked));
+    have_threads(asked - 1);  // fewer change nothing
+    std::mutex mutex;
+    std::set<std::thread::id> seen;
+    do_side_by_side(true, 30, [&](std::size_t) {
+        do_side_by_side(true, 4, [&](std::size_t) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            const std::lock_guard lock(mutex);
+            seen.insert(std::this_thread::get_id());
+        });
+    });
+    EXPECT_EQ(seen.size(), static_cast<std::size_t>(asked));
+}
+
 TEST(UnitSideBySide, ThrowsWhatTheFirstOfItsJobsThrows) {
+    have_threads(3);
     for (const bool side_by_side : {false, true})
         for (int round = 0; round < 50; ++round) {
             std::atomic<int> begun = 0;
