@@ -117,12 +117,15 @@ TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
     return *state.patch;
 }
 
-// What the next cell must take up on average so that the next `advance` takes up its mean toughness [J/m^2].
+// The rate at which the tip must take up energy for the next `advance` to take up its mean toughness [J/m^2].
 double ExplicitSolver::toughness_to_overcome(int crack, bool at_end, double here) {
     const double advance = scene_.cracks[crack].advance;
     if (advance <= body_.layout.cell.maxCoeff()) return here;
     const CrackTip& tip = cracks_.lines[crack].tip(at_end);
-    const double share = patch_of(crack, at_end).local_share(tips_[2 * crack + at_end].since_patch, displacement_);
+    const auto [now, mean] =
+        patch_of(crack, at_end)
+            .rates(tips_[2 * crack + at_end].since_patch, displacement_, ties_.softness(cracks_, crack, at_end));
+    const double share = mean > 0.0 ? now / mean : 1.0;
     return mean_toughness(materials_, {tip.position, tip.position + advance * tip.direction}) * share;
 }
 

@@ -15,19 +15,18 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// Half width of the patch: so many advances, and so many cells at least.
+// Half width of the wide patch: so many advances, and so many cells at least.
 constexpr double advances_in_reach = 8.0;
 constexpr double least_cells_in_reach = 10.0;
-
-// The held outline takes up what a longer crack would pass on to the rest of the specimen: in one wood, where the rate should
-// stay as it is, it falls by this much times the way over the half width (`VerificationTipPatch.OneWood`).
-constexpr double fall_in_one_wood = 1.62;
 
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
 constexpr double least_stiffness = 1e-9;
 
 // A pair is never taken for stiffer, or softer, than by this.
 constexpr double least_softness = 0.05;
+
+// A rate is what a tip gives up over this part of a cell.
+constexpr double little = 0.02;
 
 // Strain-displacement matrix of a point, xx, yy, 2 xy.
 Eigen::Matrix<double, 3, Eigen::Dynamic> strains(const CellWeights& w, int nodes) {
@@ -48,33 +47,54 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
     if (const auto out = exit_distance(tip.position, tip.direction, {Vec2::Zero(), body.layout.size()}))
         way = std::min(way, *out - 1e-3 * h);
     advance_ = std::min(advance, way - slack);
-    if (advance_ <= 0.0) return;  // no more than the next cell is left
+    if (advance_ <= 0.0) return;
     const auto points_before = body.points.node;
     CrackFields ahead = cracks;
     ahead.grow(crack, at_end, tip.position + way * tip.direction);
-    reach_ = std::max(advances_in_reach * advance, least_cells_in_reach * h);
 
+    const std::vector<double> mass = field_masses(body, ahead.fields());
+    std::vector<std::size_t> passed;
+    for (std::size_t k = 0; k < ahead.pairs.size(); ++k) {
+        const FieldPair& pair = ahead.pairs[k];
+        const double left = mass[pair.left], right = mass[pair.right];
+        if (pair.crack != crack || !std::isfinite(pair.compliance) || left == 0.0 || right == 0.0) continue;
+        const double freed = share_freed(body.layout.node_position(pair.node), tip, body.layout);
+        if (freed >= 1.0 || freed + way / cell_ <= 0.0) continue;
+        passed.push_back(k);
+        pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
+    }
+    const double reach = std::max(advances_in_reach * advance, least_cells_in_reach * h);
+    for (const double half_width : {0.5 * reach, reach})
+        woods_.push_back(cut_out(body, ahead, cracks.fields(), boundary, tip.position, half_width, passed));
+    body.points.node = points_before;
+}
+
+TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const CrackFields& ahead, int fields_now, const Boundary& boundary,
+                                 const Vec2& tip, double reach, const std::vector<std::size_t>& passed) const {
     // Whether fields belong to the patch, and whether to wood beyond it too.
+    Wood wood{};
     const int fields = ahead.fields();
     std::vector<bool> within(fields, false), beyond(fields, false);
     std::vector<int> cells;
-    body.for_cells_near(tip.position, reach_, [&](int c) { cells.push_back(c); });
+    body.for_cells_near(tip, reach, [&](int c) { cells.push_back(c); });
     std::vector<bool> taken(body.layout.cells(), false);
     for (const int c : cells) taken[c] = true;
-    body.for_cells_near(tip.position, reach_ + 1.5 * h, [&](int c) {
+    body.for_cells_near(tip, reach + 1.5 * body.layout.cell.maxCoeff(), [&](int c) {
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p)
-            for (const int f : body.points.node[p]) (taken[c] ? within : beyond)[f] = taken[c] || f < cracks.fields();
+            for (const int f : body.points.node[p]) (taken[c] ? within : beyond)[f] = taken[c] || f < fields_now;
     });
     std::vector<int> equation(2 * fields, -1), column(2 * fields, -1);
     int equations = 0;
     std::vector<bool> prescribed(2 * fields, false);
     for (const Boundary::Held& held : boundary.held) prescribed[2 * held.field + held.axis] = true;
+    wood.is_whole = true;
     for (int f = 0; f < fields; ++f) {
         if (!within[f]) continue;
+        wood.is_whole &= !beyond[f];
         const bool any_held = beyond[f] || prescribed[2 * f] || prescribed[2 * f + 1];
-        if (any_held) held_.push_back(f), place_.push_back(body.layout.node_position(ahead.node_of_field[f]));
+        if (any_held) wood.held.push_back(f), wood.place.push_back(body.layout.node_position(ahead.node_of_field[f]));
         for (int axis = 0; axis < 2; ++axis) {
-            if (beyond[f] || prescribed[2 * f + axis]) column[2 * f + axis] = 2 * static_cast<int>(held_.size()) - 2 + axis;
+            if (beyond[f] || prescribed[2 * f + axis]) column[2 * f + axis] = 2 * static_cast<int>(wood.held.size()) - 2 + axis;
             else equation[2 * f + axis] = equations++;
         }
     }
@@ -98,77 +118,70 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
             }
         }
     }
-    // The pairs on the way; the ties of all others stay as they are.
+    // The ties of all pairs but those on the way stay as they are.
     const std::vector<double> mass = field_masses(body, fields);
-    std::vector<const FieldPair*> asked;
-    for (const FieldPair& pair : ahead.pairs) {
-        if (!within[pair.left] || !within[pair.right] || mass[pair.left] == 0.0 || mass[pair.right] == 0.0) continue;
-        const double freed = share_freed(body.layout.node_position(pair.node), tip, body.layout);
-        if (pair.crack == crack && std::isfinite(pair.compliance) && freed < 1.0 && freed + way / cell_ > 0.0) {
-            const double left = mass[pair.left], right = mass[pair.right];
-            asked.push_back(&pair);
-            freed_.push_back(freed);
-            compliance_.push_back(pair.compliance / tie_share(left, right));
-            continue;
-        }
-        if (pair.freed >= 1.0) continue;
-        const double k = shared_tie(pair, mass);
+    for (std::size_t k = 0; k < ahead.pairs.size(); ++k) {
+        const FieldPair& pair = ahead.pairs[k];
+        const bool is_within = within[pair.left] && within[pair.right] && mass[pair.left] > 0.0 && mass[pair.right] > 0.0;
+        if (!is_within || pair.freed >= 1.0 || std::ranges::binary_search(passed, k)) continue;
+        const double tie = shared_tie(pair, mass);
         for (int axis = 0; axis < 2; ++axis) {
             const int l = equation[2 * pair.left + axis], r = equation[2 * pair.right + axis];
             if (l < 0 || r < 0) continue;
-            inner.emplace_back(l, l, k), inner.emplace_back(r, r, k), inner.emplace_back(l, r, -k), inner.emplace_back(r, l, -k);
+            inner.emplace_back(l, l, tie), inner.emplace_back(r, r, tie);
+            inner.emplace_back(l, r, -tie), inner.emplace_back(r, l, -tie);
         }
     }
-    body.points.node = points_before;
     for (int e = 0; e < equations; ++e) inner.emplace_back(e, e, least_stiffness * stiffest);
-    Sparse K(equations, equations), to_held(equations, 2 * static_cast<int>(held_.size()));
+    Sparse K(equations, equations), to_held(equations, 2 * static_cast<int>(wood.held.size()));
     K.setFromTriplets(inner.begin(), inner.end());
     to_held.setFromTriplets(outer.begin(), outer.end());
 
-    const int jumps = 2 * static_cast<int>(asked.size());
+    const auto jumps = static_cast<Eigen::Index>(2 * passed.size());
     Eigen::MatrixXd apart = Eigen::MatrixXd::Zero(equations, jumps);
-    for (int j = 0; j < jumps; ++j) {
-        const FieldPair& pair = *asked[j / 2];
-        if (equation[2 * pair.left + j % 2] >= 0) apart(equation[2 * pair.left + j % 2], j) += 1.0;
-        if (equation[2 * pair.right + j % 2] >= 0) apart(equation[2 * pair.right + j % 2], j) -= 1.0;
+    for (Eigen::Index j = 0; j < jumps; ++j) {
+        const FieldPair& pair = ahead.pairs[passed[j / 2]];
+        if (const int e = equation[2 * pair.left + j % 2]; e >= 0) apart(e, j) += 1.0;
+        if (const int e = equation[2 * pair.right + j % 2]; e >= 0) apart(e, j) -= 1.0;
     }
     const Eigen::SimplicialLLT<Sparse> factor(K);
     const Eigen::MatrixXd moved = factor.solve(apart);
-    flexibility_ = apart.transpose() * moved;
-    by_held_ = -moved.transpose() * to_held;
+    wood.flexibility = apart.transpose() * moved;
+    wood.by_held = -moved.transpose() * to_held;
+    return wood;
 }
 
-Eigen::VectorXd TipPatch::free_jumps(const std::vector<Vec2>& displacement) const {
+Eigen::VectorXd TipPatch::Wood::jumps_of(const std::vector<Vec2>& displacement) const {
     // The turn of the patch as a whole, by the best fit of a linear field to what is held.
     Vec2 middle = Vec2::Zero(), mean = Vec2::Zero();
-    for (std::size_t i = 0; i < held_.size(); ++i) middle += place_[i], mean += displacement[held_[i]];
-    middle /= static_cast<double>(held_.size());
-    mean /= static_cast<double>(held_.size());
+    for (std::size_t i = 0; i < held.size(); ++i) middle += place[i], mean += displacement[held[i]];
+    middle /= static_cast<double>(held.size());
+    mean /= static_cast<double>(held.size());
     Mat2 spread = Mat2::Zero(), arms = Mat2::Zero();
-    for (std::size_t i = 0; i < held_.size(); ++i) {
-        const Vec2 arm = place_[i] - middle;
-        spread += (displacement[held_[i]] - mean) * arm.transpose();
+    for (std::size_t i = 0; i < held.size(); ++i) {
+        const Vec2 arm = place[i] - middle;
+        spread += (displacement[held[i]] - mean) * arm.transpose();
         arms += arm * arm.transpose();
     }
     const Mat2 turn = Polar(spread * arms.inverse()).turn;
-    Eigen::VectorXd held(2 * held_.size());
-    for (std::size_t i = 0; i < held_.size(); ++i) {
-        const Vec2 arm = place_[i] - middle;
-        held.segment<2>(2 * i) = turn.transpose() * (arm + displacement[held_[i]] - mean) - arm;
+    Eigen::VectorXd moved(2 * held.size());
+    for (std::size_t i = 0; i < held.size(); ++i) {
+        const Vec2 arm = place[i] - middle;
+        moved.segment<2>(2 * i) = turn.transpose() * (arm + displacement[held[i]] - mean) - arm;
     }
-    return by_held_ * held;
+    return by_held * moved;
 }
 
 // Less that without ties [J].
-double TipPatch::potential(double at, double softness, const Eigen::VectorXd& jumps) const {
+double TipPatch::potential(const Wood& wood, double at, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const {
     std::vector<int> tied;
     std::vector<double> tie_compliance;
-    for (std::size_t k = 0; k < freed_.size(); ++k) {
-        const double f = std::max(0.0, freed_[k] + at / cell_);
+    for (std::size_t k = 0; k < pairs_.size(); ++k) {
+        const double f = std::max(0.0, pairs_[k].freed + at / cell_);
         if (f >= 1.0) continue;
         for (int axis = 0; axis < 2; ++axis) {
             tied.push_back(2 * static_cast<int>(k) + axis);
-            tie_compliance.push_back(f * softness * compliance_[k] / (1.0 - f));
+            tie_compliance.push_back(f * softness[k] * pairs_[k].compliance / (1.0 - f));
         }
     }
     const auto n = static_cast<Eigen::Index>(tied.size());
@@ -176,38 +189,66 @@ double TipPatch::potential(double at, double softness, const Eigen::VectorXd& ju
     Eigen::VectorXd w(n);
     for (Eigen::Index i = 0; i < n; ++i) {
         w[i] = jumps[tied[i]];
-        for (Eigen::Index j = 0; j < n; ++j) C(i, j) = flexibility_(tied[i], tied[j]) + (i == j ? tie_compliance[i] : 0.0);
+        for (Eigen::Index j = 0; j < n; ++j) C(i, j) = wood.flexibility(tied[i], tied[j]) + (i == j ? tie_compliance[i] : 0.0);
     }
     return 0.5 * w.dot(C.ldlt().solve(w));
 }
 
-double TipPatch::softness_for(double gone, const Eigen::VectorXd& jumps) const {
-    if (freed_.empty() || jumps.isZero()) return 1.0;
-    double next = cell_;  // until the tip is at the next pair
-    for (const double freed : freed_) {
-        const double until = -(freed * cell_ + gone);
+// How far the tip is from the next pair [m].
+double TipPatch::to_next_pair(double gone) const {
+    double next = cell_;
+    for (const Pair& pair : pairs_) {
+        const double until = -(pair.freed * cell_ + gone);
         if (until >= -0.05 * cell_) next = std::min(next, std::max(0.0, until));
     }
-    const double from = gone + next;
-    const double middle = 0.5 * (potential(from, 1.0, jumps) + potential(from + cell_, 1.0, jumps));
-    double low = std::log(least_softness), high = -low;
-    for (int k = 0; k < 12; ++k) {
-        const double trial = 0.5 * (low + high);
-        (potential(from + 0.5 * cell_, std::exp(trial), jumps) > middle ? low : high) = trial;
-    }
-    return std::exp(0.5 * (low + high));
+    return next;
 }
 
-double TipPatch::local_share(double gone, const std::vector<Vec2>& displacement) const {
-    if (advance_ <= cell_ || held_.empty()) return 1.0;
-    const Eigen::VectorXd jumps = free_jumps(displacement);
-    const double softness = softness_for(gone, jumps);
-    const double here = potential(gone, softness, jumps);
-    const auto rate_over = [&](double way) {
-        return (here - potential(gone + way, softness, jumps)) / (way * (1.0 - 0.5 * fall_in_one_wood * way / reach_));
-    };
-    const double mean = rate_over(advance_);
-    return mean > 0.0 ? rate_over(cell_) / mean : 1.0;
+double TipPatch::beyond_outline(const std::function<double(const Wood&)>& of) const {
+    const double wide = of(woods_.back());
+    return woods_.back().is_whole ? wide : 2.0 * wide - of(woods_.front());
+}
+
+double TipPatch::softness(double gone, const std::vector<Vec2>& displacement) const {
+    if (is_idle()) return 1.0;
+    const double from = gone + to_next_pair(gone);
+    const double found = beyond_outline([&](const Wood& wood) {
+        const Eigen::VectorXd jumps = wood.jumps_of(displacement);
+        if (jumps.isZero()) return 1.0;
+        const auto at = [&](double place, double factor) {
+            return potential(wood, place, std::vector<double>(pairs_.size(), factor), jumps);
+        };
+        const double middle = 0.5 * (at(from, 1.0) + at(from + cell_, 1.0));
+        double low = std::log(least_softness), high = -low;
+        for (int k = 0; k < 12; ++k) {
+            const double trial = 0.5 * (low + high);
+            (at(from + 0.5 * cell_, std::exp(trial)) > middle ? low : high) = trial;
+        }
+        return std::exp(0.5 * (low + high));
+    });
+    return std::clamp(found, least_softness, 1.0 / least_softness);
+}
+
+TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displacement, std::span<const Softness> ties) const {
+    if (is_idle() || advance_ <= cell_) return {};
+    std::vector<double> factors(pairs_.size(), softness(gone, displacement));
+    for (std::size_t k = 0; k < pairs_.size(); ++k)
+        for (const Softness& tie : ties)
+            if (tie.node == pairs_[k].node) factors[k] = tie.factor;
+    // From where the tip is at a pair to where it is at the next one the potential goes linearly: so it will when it is there.
+    const double next = to_next_pair(gone), cells = (advance_ - next) / cell_, whole = std::floor(cells);
+    const double last = gone + next + whole * cell_;
+    double now = 0.0;
+    const double now_over_mean = beyond_outline([&](const Wood& wood) {
+        const Eigen::VectorXd jumps = wood.jumps_of(displacement);
+        const auto at = [&](double place) { return potential(wood, place, factors, jumps); };
+        const double here = at(gone), before = at(last);
+        const double end = before + (cells - whole) * (at(last + cell_) - before);
+        const double rate = (here - at(gone + little * cell_)) / (little * cell_);
+        if (&wood == &woods_.back()) now = rate;
+        return rate * advance_ / (here - end);
+    });
+    return {now, now / now_over_mean};
 }
 
 }  // namespace crampfit

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include <functional>
+#include <span>
 #include <vector>
 
 namespace crampfit {
@@ -17,36 +19,60 @@ namespace crampfit {
 ///     Pi(x) = const + 1/2 w0^T (C + S(x))^-1 w0,
 /// S(x) being the compliance f c / (1 - f) of their ties (CrackFields) with the tip at x. Small strain, of what is left when the
 /// patch's turn as a whole is taken off.
+///
+/// The held outline takes up what a longer crack would pass on to the rest of the specimen, so that the rate falls on the way, by
+/// a part of it that goes with the way over the patch's size: two patches, one half as wide as the other, tell what it would be
+/// without (Richardson 1911).
 class TipPatch {
   public:
+    /// Softness of the tie that holds the pair at a node (TipTies).
+    struct Softness {
+        int node;
+        double factor;
+    };
+
     /// Leaves `body` as it was. `slack` [m] is how far the tip may go on before this patch is no longer good.
     TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end, double advance,
              double slack);
 
-    /// Mean energy release rate over the next cell over that over the next `advance`, with the tip `gone` [m] beyond where it was
-    /// when the patch was made; 1 where there is no load.
-    double local_share(double gone, const std::vector<Vec2>& displacement) const;
+    struct Rates {
+        double now = 0;   // what the ties give up now
+        double mean = 0;  // over the next `advance`
+    };
+
+    /// Energy release rates [J/m], with the tip `gone` [m] beyond where it was when the patch was made and these ties at it. Nil
+    /// where there is no load, or no more than the next cell is left.
+    Rates rates(double gone, const std::vector<Vec2>& displacement, std::span<const Softness> ties) const;
 
     /// What the compliances of the next pairs must be multiplied by for the potential to go linearly while the tip passes them;
     /// the formula of `FieldPair::compliance` does not know of boundaries in the wood.
-    double softness(double gone, const std::vector<Vec2>& displacement) const {
-        return held_.empty() ? 1.0 : softness_for(gone, free_jumps(displacement));
-    }
+    double softness(double gone, const std::vector<Vec2>& displacement) const;
 
   private:
-    double potential(double at, double softness, const Eigen::VectorXd& jumps) const;
-    double softness_for(double gone, const Eigen::VectorXd& jumps) const;
-    Eigen::VectorXd free_jumps(const std::vector<Vec2>& displacement) const;
+    struct Pair {
+        int node;
+        double freed;       // share when the patch was made, below 0 ahead
+        double compliance;  // c [m/N]
+    };
+    struct Wood {
+        bool is_whole;                // nothing but what is prescribed holds its outline
+        std::vector<int> held;        // fields
+        std::vector<Vec2> place;      // [held] [m]
+        Eigen::MatrixXd by_held;      // [jumps x 2 held] of the free pairs per displacement of the held fields
+        Eigen::MatrixXd flexibility;  // C [jumps x jumps] [m/N]
+        Eigen::VectorXd jumps_of(const std::vector<Vec2>& displacement) const;  // w0 [m]
+    };
+    Wood cut_out(const Discretisation& body, const CrackFields& ahead, int fields_now, const Boundary& boundary, const Vec2& tip,
+                 double reach, const std::vector<std::size_t>& passed) const;
+    double potential(const Wood& wood, double at, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
+    double beyond_outline(const std::function<double(const Wood&)>& of) const;
+    double to_next_pair(double gone) const;
+    bool is_idle() const { return woods_.empty() || pairs_.empty() || woods_.back().held.empty(); }
 
-    double reach_ = 0;                // half width [m]
-    double cell_ = 0;                 // way of the tip that frees a pair [m]
-    double advance_ = 0;              // what was asked for, or as far as the tip stays in the wood [m]
-    std::vector<int> held_;           // fields
-    std::vector<Vec2> place_;         // [held] [m]
-    Eigen::MatrixXd by_held_;         // [jumps x 2 held] of the free pairs per displacement of the held fields
-    Eigen::MatrixXd flexibility_;     // C [jumps x jumps] [m/N]
-    std::vector<double> freed_;       // [pairs] share when the patch was made, below 0 ahead
-    std::vector<double> compliance_;  // [pairs] c [m/N]
+    double cell_ = 0;          // way of the tip that frees a pair [m]
+    double advance_ = 0;       // what was asked for, or as far as the tip stays in the wood [m]
+    std::vector<Pair> pairs_;  // on the way
+    std::vector<Wood> woods_;  // the narrow one, the wide one; none where no more than the next cell is left
 };
 
 }  // namespace crampfit

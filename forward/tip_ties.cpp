@@ -133,6 +133,13 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
     return std::any_of(live_.begin(), live_.end(), [&](std::size_t k) { return is_of(cracks, cracks.pairs[k], crack, at_end); });
 }
 
+std::vector<TipPatch::Softness> TipTies::softness(const CrackFields& cracks, int crack, bool at_end) const {
+    std::vector<TipPatch::Softness> found;
+    for (const std::size_t k : live_)
+        if (is_of(cracks, cracks.pairs[k], crack, at_end)) found.push_back({cracks.pairs[k].node, ties_[k].softness});
+    return found;
+}
+
 double TipTies::taken_on(const CrackFields& cracks, int crack, bool at_end, double way, const Motion& motion) const {
     const double width_here = width(cracks.lines[crack].tip(at_end));
     double sum = 0.0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/cracks.hpp"
+#include "forward/tip_patch.hpp"
 
 #include <functional>
 #include <vector>
@@ -65,6 +66,9 @@ class TipTies {
     /// Whether it is this tip that frees the pair.
     static bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end);
     bool holds(const CrackFields& cracks, int crack, bool at_end) const;
+
+    /// Of the ties of a tip.
+    std::vector<TipPatch::Softness> softness(const CrackFields& cracks, int crack, bool at_end) const;
 
   private:
     struct Tie {
