@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <utility>
 
 namespace crampfit {
 
@@ -210,7 +212,7 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     hold_further_fields(cracks);
 }
 
-// Whether some point of a field has its domain at the edge.
+// Whether some point of a field has its domain at the edge, on the stretch of the side that it drives.
 bool Boundary::lies_at(const Edge& edge, int field, int node) const {
     bool found = false;
     body_.for_cells_near(body_.layout.node_position(node), 0.5 * body_.layout.cell.minCoeff(), [&](int c) {
@@ -218,11 +220,13 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
             const auto fields = body_.points.node[p];
             if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
             const Box domain = body_.domain(p);
-            found |= on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high);
+            found |= (on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high)) &&
+                     in_range(body_.layout, edge, body_.points.position[p]);
         }
         for (const Sliver& sliver : body_.slivers_of(c, c + 1)) {
             if (std::ranges::find(sliver.node, field) == sliver.node.end()) continue;
-            found |= on_side(body_.layout, edge.side, sliver.low) || on_side(body_.layout, edge.side, sliver.high);
+            found |= (on_side(body_.layout, edge.side, sliver.low) || on_side(body_.layout, edge.side, sliver.high)) &&
+                     in_range(body_.layout, edge, sliver.position);
         }
     });
     return found;
@@ -230,29 +234,68 @@ bool Boundary::lies_at(const Edge& edge, int field, int node) const {
 
 void Boundary::hold_further_fields(const CrackFields& cracks) {
     const int nodes = body_.layout.nodes();
-    const auto go_on = [&](auto& holds) {
-        std::erase_if(holds, [&](const auto& h) { return h.field >= nodes; });
-        const std::size_t on_nodes = holds.size();
-        for (int f = nodes; f < cracks.fields(); ++f)
-            for (std::size_t i = 0; i < on_nodes; ++i) {
-                auto further = holds[i];
-                if (further.field != cracks.node_of_field[f]) continue;
-                const auto keeps = [&](int driver) {
-                    return driver >= edges_ || lies_at(scene_.edges[driver], f, holds[i].field);
-                };
-                if (!keeps(further.driver)) {  // a crack may cut a corner off: what lies at the other side is held there
-                    const auto other = std::ranges::find_if(at_corners_, [&](const Held& h) {
-                        return h.field == holds[i].field && h.axis == holds[i].axis && keeps(h.driver);
-                    });
-                    if (other == at_corners_.end()) continue;
-                    further.driver = other->driver;
-                }
-                further.field = f;
-                holds.push_back(further);
-            }
+    std::vector<std::vector<int>> further(nodes);  // fields
+    for (int f = nodes; f < cracks.fields(); ++f) further[cracks.node_of_field[f]].push_back(f);
+    const auto keeps = [&](int driver, int field, int node) {
+        return driver >= edges_ || lies_at(scene_.edges[driver], field, node);
     };
-    go_on(held);
-    go_on(tied);
+
+    // All that would hold a node, first in the list first: a crack may cut a corner off, or part two stretches, so that its two
+    // sides are held by one each, or one of them by none.
+    std::vector<Held> would_hold;
+    std::map<std::pair<int, int>, std::vector<int>> drivers_at;  // by node and axis
+    for (const auto* holds : {&held, &at_corners_}) {
+        for (const Held& h : *holds) {
+            if (h.field >= nodes) continue;
+            std::vector<int>& drivers = drivers_at[{h.field, h.axis}];
+            if (drivers.empty()) would_hold.push_back(h);
+            drivers.insert(std::ranges::upper_bound(drivers, h.driver), h.driver);
+        }
+    }
+    held.clear();
+    at_corners_.clear();
+    std::vector<Held> held_beyond;
+    for (const Held& h : would_hold) {
+        std::vector<int> drivers = drivers_at.at({h.field, h.axis});
+        const int node = h.field;
+        int on_node = -1;
+        bool is_held = false;
+        if (further[node].empty()) {
+            on_node = drivers.front();
+        } else {
+            const auto first_for = [&](int field) {
+                const auto driver = std::ranges::find_if(drivers, [&](int d) { return keeps(d, field, node); });
+                return driver == drivers.end() ? -1 : *driver;
+            };
+            on_node = first_for(node);
+            for (const int field : further[node]) {
+                const int driver = first_for(field);
+                if (driver < 0) continue;
+                held_beyond.push_back({field, h.axis, driver});
+                is_held = true;
+            }
+            if (on_node < 0 && !is_held) on_node = drivers.front();
+        }
+        if (on_node >= 0) held.push_back({node, h.axis, on_node});
+        bool is_used = false;
+        for (const int driver : drivers) {
+            if (driver == on_node && !is_used) is_used = true;
+            else at_corners_.push_back({node, h.axis, driver});
+        }
+    }
+    std::ranges::stable_sort(held_beyond, {}, &Held::field);
+    held.insert(held.end(), held_beyond.begin(), held_beyond.end());
+
+    std::erase_if(tied, [&](const Tied& t) { return t.field >= nodes; });
+    const std::size_t on_nodes = tied.size();
+    for (std::size_t i = 0; i < on_nodes; ++i) {
+        for (const int field : further[tied[i].field]) {
+            Tied beyond = tied[i];
+            if (!keeps(beyond.driver, field, beyond.field)) continue;
+            beyond.field = field;
+            tied.push_back(beyond);
+        }
+    }
 }
 
 void Boundary::place_tractions() {

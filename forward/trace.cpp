@@ -326,7 +326,7 @@ class Tracer {
             largest_imbalance_ = std::max(largest_imbalance_, std::abs(imbalance_));
             largest_energy_ = std::max({largest_energy_, std::abs(row.external_work), stored});
         } else {
-            row.external_work = m.load.traction_work;
+            row.external_work = stored;  // what stays was laid on slowly
         }
         last_ = m;
         most_power_ = std::max(most_power_, std::abs(m.load.power));
