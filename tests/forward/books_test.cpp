@@ -97,6 +97,17 @@ TEST(VerificationBooks, ColumnsHoldTheWorkOfAPressingBody) {
 }
 
 // Two cracks that start in a hole and leave the specimen: the tips take up the toughness times their way.
+TEST(VerificationBooks, ALoadThatStaysWasLaidOnSlowly) {
+    // Clapeyron (1833): it does half of what it would do from the first at its full size.
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
+    scene.edges = {pulled("top", Side::top, {0.0, 1e5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"top", "top"};
+    scene.stop.time = 1.0;
+    const auto end = simulate(scene).series.back();
+    EXPECT_GT(end.strain_energy, 0.0);
+    EXPECT_NEAR(end.external_work, end.strain_energy, 1e-9 * end.strain_energy);
+}
+
 TEST(VerificationBooks, CracksOutOfAHolePayForTheirWay) {
     Scene scene = block({10e-3, 10e-3}, 0.25e-3);
     scene.materials["EW"].toughness = 20.0;

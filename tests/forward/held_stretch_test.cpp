@@ -49,6 +49,33 @@ TEST(VerificationHeldStretch, IsHalfACrackWhereverInACellItEnds) {
     EXPECT_LT(worst, 1e-9);
 }
 
+TEST(VerificationHeldStretch, EndsAtACracksMouth) {
+    // Two arms drawn apart, each by a stretch of the side up to the crack between them, as by one that ends just short of it.
+    const auto arms = [](double mouth, double gap, bool both) {
+        Scene scene = at_equilibrium(block({20e-3, 10e-3}, 0.5e-3));
+        Crack crack;
+        crack.points = {Vec2(20e-3, mouth), Vec2(10e-3, mouth)};
+        scene.cracks = {crack};
+        Edge upper = moving("upper", Side::right, {0.0, speed}), lower = moving("lower", Side::right, {0.0, 0.0});
+        upper.velocity[0] = lower.velocity[0] = std::nullopt;
+        upper.range = {{mouth + gap, 10e-3}};
+        lower.range = {{0.0, mouth - gap}};
+        scene.edges = {upper, moving("left", Side::left, {0.0, 0.0})};
+        if (both) scene.edges.push_back(lower);
+        scene.measure = {"upper", "upper"};
+        scene.stop.displacement = 0.05e-3;
+        return force(scene);
+    };
+    for (const bool both : {true, false}) {
+        for (const double mouth : {5e-3, 5.2e-3, 5.3e-3}) {
+            const double off = arms(mouth, 0.0, both) / arms(mouth, 0.01e-3, both) - 1;
+            std::printf("%s at a mouth at %.1f mm: force within %.1e of that just beside it\n", both ? "both arms" : "one arm",
+                        1e3 * mouth, std::abs(off));
+            EXPECT_LT(std::abs(off), 0.005);
+        }
+    }
+}
+
 TEST(VerificationHeldStretch, IsHalfACrackWhereItTurnsFar) {
     const auto far = [](Scene scene) {
         scene.stop.displacement = 20 * *scene.stop.displacement;
