@@ -147,7 +147,7 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
     const auto hold = [&](int node, int axis, int driver) {  // where two meet, the first in the list holds
         if (taken[node][axis]) {
-            if (driver < edges_) at_corners_.push_back({node, axis, driver});
+            if (driver < edges_) others_.push_back({node, axis, driver});
             return false;
         }
         taken[node][axis] = true;
@@ -244,7 +244,7 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
     // sides are held by one each, or one of them by none.
     std::vector<Held> would_hold;
     std::map<std::pair<int, int>, std::vector<int>> drivers_at;  // by node and axis
-    for (const auto* holds : {&held, &at_corners_}) {
+    for (const auto* holds : {&held, &others_}) {
         for (const Held& h : *holds) {
             if (h.field >= nodes) continue;
             std::vector<int>& drivers = drivers_at[{h.field, h.axis}];
@@ -253,10 +253,10 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
         }
     }
     held.clear();
-    at_corners_.clear();
+    others_.clear();
     std::vector<Held> held_beyond;
     for (const Held& h : would_hold) {
-        std::vector<int> drivers = drivers_at.at({h.field, h.axis});
+        const std::vector<int>& drivers = drivers_at.at({h.field, h.axis});
         const int node = h.field;
         int on_node = -1;
         bool is_held = false;
@@ -277,11 +277,8 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
             if (on_node < 0 && !is_held) on_node = drivers.front();
         }
         if (on_node >= 0) held.push_back({node, h.axis, on_node});
-        bool is_used = false;
-        for (const int driver : drivers) {
-            if (driver == on_node && !is_used) is_used = true;
-            else at_corners_.push_back({node, h.axis, driver});
-        }
+        for (const int driver : drivers)
+            if (driver != on_node) others_.push_back({node, h.axis, driver});
     }
     std::ranges::stable_sort(held_beyond, {}, &Held::field);
     held.insert(held.end(), held_beyond.begin(), held_beyond.end());
@@ -291,7 +288,9 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
     for (std::size_t i = 0; i < on_nodes; ++i) {
         for (const int field : further[tied[i].field]) {
             Tied beyond = tied[i];
-            if (!keeps(beyond.driver, field, beyond.field)) continue;
+            Edge side = scene_.edges[beyond.driver];  // the tie is there for what is free beyond its stretch
+            side.range.reset();
+            if (!lies_at(side, field, beyond.field)) continue;
             beyond.field = field;
             tied.push_back(beyond);
         }

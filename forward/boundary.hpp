@@ -41,8 +41,9 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// Holds the further fields of held nodes as the cracks have come to lie: those whose wood lies at the edge. Wood beyond a
-    /// crack that runs alongside the edge does not, and moves freely.
+    /// Holds the fields of nodes as the cracks have come to lie: where a node has several, each by the first whose stretch its
+    /// wood lies on. So arms on either side of a crack's mouth are held each on its own, and wood beyond a crack that runs
+    /// alongside the edge moves freely.
     void hold_further_fields(const CrackFields& cracks);
 
     Vec2 velocity_of(int driver) const;          // while it moves [m/s]
@@ -67,7 +68,7 @@ class Boundary {
     const Scene& scene_;
     const Discretisation& body_;
     int edges_;
-    std::vector<Held> at_corners_;  // by edges after the first that holds the node
+    std::vector<Held> others_;  // of nodes: what else would hold them
 };
 
 /// What is measured: which drivers, and along which directions.

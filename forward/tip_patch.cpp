@@ -52,18 +52,20 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
     CrackFields ahead = cracks;
     ahead.grow(crack, at_end, tip.position + way * tip.direction);
 
+    const double reach = std::max(advances_in_reach * advance, least_cells_in_reach * h);
     const std::vector<double> mass = field_masses(body, ahead.fields());
     std::vector<std::size_t> passed;
     for (std::size_t k = 0; k < ahead.pairs.size(); ++k) {
         const FieldPair& pair = ahead.pairs[k];
         const double left = mass[pair.left], right = mass[pair.right];
         if (pair.crack != crack || !std::isfinite(pair.compliance) || left == 0.0 || right == 0.0) continue;
-        const double freed = share_freed(body.layout.node_position(pair.node), tip, body.layout);
-        if (freed >= 1.0 || freed + way / cell_ <= 0.0) continue;
+        const Vec2 place = body.layout.node_position(pair.node);
+        const double freed = share_freed(place, tip, body.layout);
+        const bool is_near = (place - tip.position).cwiseAbs().maxCoeff() < 0.5 * reach - h;  // a crack may come back on itself
+        if (!is_near || freed >= 1.0 || freed + way / cell_ <= 0.0) continue;
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
-    const double reach = std::max(advances_in_reach * advance, least_cells_in_reach * h);
     for (const double half_width : {0.5 * reach, reach})
         woods_.push_back(cut_out(body, ahead, cracks.fields(), boundary, tip.position, half_width, passed));
     body.points.node = points_before;
@@ -248,6 +250,7 @@ TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displaceme
         if (&wood == &woods_.back()) now = rate;
         return rate * advance_ / (here - end);
     });
+    if (!(now_over_mean > 0.0)) return {};
     return {now, now / now_over_mean};
 }
 

@@ -171,7 +171,9 @@ void check_growth(const Experiment& test) {
     const double first = std::accumulate(lengths.begin(), lengths.begin() + few, 0.0) / static_cast<double>(few);
     const double last = std::accumulate(lengths.end() - few, lengths.end(), 0.0) / static_cast<double>(few);
     double scatter = 0.0;
-    for (std::size_t i = 1; i < lengths.size(); ++i) scatter += std::pow(lengths[i] - lengths[i - 1], 2);
+    for (std::size_t i = 1; i < lengths.size(); ++i) {
+        scatter += std::pow(lengths[i] - lengths[i - 1], 2);
+    }
     scatter = std::sqrt(0.5 * scatter / static_cast<double>(lengths.size() - 1));
     const double noise = test.noise.crack_length.value_or(scatter) * std::sqrt(2.0 / static_cast<double>(few));
     if (last - first > clearly * noise) {

@@ -96,7 +96,6 @@ TEST(VerificationBooks, ColumnsHoldTheWorkOfAPressingBody) {
     EXPECT_NEAR((end.strain_energy + end.kinetic_energy + end.fracture_energy) / end.external_work, 1.0, closed);
 }
 
-// Two cracks that start in a hole and leave the specimen: the tips take up the toughness times their way.
 TEST(VerificationBooks, ALoadThatStaysWasLaidOnSlowly) {
     // Clapeyron (1833): it does half of what it would do from the first at its full size.
     Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
@@ -108,6 +107,7 @@ TEST(VerificationBooks, ALoadThatStaysWasLaidOnSlowly) {
     EXPECT_NEAR(end.external_work, end.strain_energy, 1e-9 * end.strain_energy);
 }
 
+// Two cracks that start in a hole and leave the specimen: the tips take up the toughness times their way.
 TEST(VerificationBooks, CracksOutOfAHolePayForTheirWay) {
     Scene scene = block({10e-3, 10e-3}, 0.25e-3);
     scene.materials["EW"].toughness = 20.0;
