@@ -340,7 +340,7 @@ std::string fit_page(const Fit& fit, const Origin& origin) {
     return page(title, heading(title, "Fit", origin) + summary(fit) + models_section(fit) + parameters_section(fit) +
                            paths_section(fit) + comparisons_section(fit) + checks_section(fit) + distances_section(fit) +
                            correlation_section(fit) + profiles_section(fit) + posterior_section(fit) + runs_section(fit) +
-                           repeat_section(fit.study_text, "fit", "study.toml", origin));
+                           repeat_section(fit.study_text, "fit", "study.toml", origin, fit.scene_settings));
 }
 
 }  // namespace crampfit::cli

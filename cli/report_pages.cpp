@@ -24,13 +24,14 @@ std::string heading(const std::string& title, const std::string& kind, const Ori
                        escaped(title));
 }
 
-std::string repeat_section(const std::string& toml, const std::string& verb, const std::string& input, const Origin& origin) {
-    return section(
-        "How to repeat it",
-        paragraph(fmt::format("Save the text below as {}, with the files that it names beside it; values that --set changed "
-                              "are in it. The result was written by crampfit {}.",
-                              input, origin.version)) +
-            verbatim(fmt::format("crampfit {} {} -o {}", verb, input, origin.file.filename().string())) + verbatim(toml));
+std::string repeat_section(const std::string& toml, const std::string& verb, const std::string& input, const Origin& origin,
+                           const std::string& settings) {
+    return section("How to repeat it",
+                   paragraph(fmt::format("Save the text below as {}, with the files that it names beside it; it holds what --set "
+                                         "changed in it. The result was written by crampfit {}.",
+                                         input, origin.version)) +
+                       verbatim(fmt::format("crampfit {} {}{} -o {}", verb, input, settings, origin.file.filename().string())) +
+                       verbatim(toml));
 }
 
 }  // namespace crampfit::cli

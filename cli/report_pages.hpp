@@ -41,7 +41,8 @@ std::string title_of(const std::string& toml, const Origin& origin);
 /// The head of a page.
 std::string heading(const std::string& title, const std::string& kind, const Origin& origin);
 
-/// How to come to this result again: what to save as `input`, and the command.
-std::string repeat_section(const std::string& toml, const std::string& verb, const std::string& input, const Origin& origin);
+/// How to come to this result again: what to save as `input`, and the command with `settings` that the text does not hold.
+std::string repeat_section(const std::string& toml, const std::string& verb, const std::string& input, const Origin& origin,
+                           const std::string& settings = "");
 
 }  // namespace crampfit::cli

@@ -21,6 +21,16 @@ std::string parameters_section(const Sensitivity& sensitivity) {
     return section("Parameters", table("What was varied", {"Parameter", "Initial", "Lower", "Upper", "Unit", "Key"}, rows));
 }
 
+std::string unit_of(const Sensitivity& sensitivity, const SensitivityIndex& index) {
+    const auto unit = [](const auto& list, const std::string& name) {
+        const auto found = std::ranges::find_if(list, [&](const auto& member) { return member.name == name; });
+        return found == list.end() || found->unit.empty() ? "1" : found->unit;
+    };
+    const std::string of_output = unit(sensitivity.outputs, index.output);
+    if (index.kind == "mu_star" || index.kind == "sigma") return of_output;
+    return index.kind == "derivative" ? fmt::format("{} / ({})", of_output, unit(sensitivity.parameters, index.parameter)) : "–";
+}
+
 /// A table with an interval drawn in each row; bars of one output and kind share a scale.
 std::string indices_section(const Sensitivity& sensitivity) {
     using OfKind = std::pair<std::string, std::string>;
@@ -36,7 +46,7 @@ std::string indices_section(const Sensitivity& sensitivity) {
     std::string markup =
         "<div class=\"scroll\"><table>\n<caption>Indices with their 95 % intervals; bars of one output and kind share a "
         "scale, the thin line is 0</caption>\n<thead><tr>";
-    for (const char* head : {"Output", "Parameter", "Kind", "Value", "95 % interval", ""})
+    for (const char* head : {"Output", "Parameter", "Method", "Kind", "Value", "95 % interval", "Unit", ""})
         markup += fmt::format("<th scope=\"col\">{}</th>", head);
     markup += "</tr></thead>\n<tbody>\n";
     for (const SensitivityIndex& index : sensitivity.indices) {
@@ -45,8 +55,10 @@ std::string indices_section(const Sensitivity& sensitivity) {
             return high > low && std::isfinite(value) ? 5 + 130 * (value - low) / (high - low) : 5;
         };
         markup += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to {:.4g}</td>",
-            escaped(index.output), escaped(index.parameter), escaped(index.kind), index.value, index.lower_95, index.upper_95);
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to "
+            "{:.4g}</td><td>{}</td>",
+            escaped(index.output), escaped(index.parameter), escaped(index.method), escaped(index.kind), index.value,
+            index.lower_95, index.upper_95, escaped(unit_of(sensitivity, index)));
         markup += fmt::format(
             "<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" stroke=\"#777\" />"
             "<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" /><circle cx=\"{:.1f}\" cy=\"7\" r=\"4\" "
@@ -73,7 +85,8 @@ std::string sensitivity_page(const Sensitivity& sensitivity, const Origin& origi
     body += facts({{"Cost", fmt::format("{} forward runs in {}", sensitivity.runs.size(), duration_text(sensitivity.seconds))},
                    {"Seed", std::to_string(sensitivity.seed)}});
     body += parameters_section(sensitivity) + indices_section(sensitivity) + runs_section(sensitivity);
-    return page(title, body + repeat_section(sensitivity.study_text, "sensitivity", "study.toml", origin));
+    return page(title,
+                body + repeat_section(sensitivity.study_text, "sensitivity", "study.toml", origin, sensitivity.scene_settings));
 }
 
 }  // namespace crampfit::cli

@@ -115,6 +115,7 @@ struct Fit {
     double seconds = 0;  // wall time [s]
     unsigned seed = 0;
     std::string study_text;
+    std::string scene_settings;  // what --set changed in the scenes, as it stands on a command line
 };
 
 /// How far the photographed paths of all experiments together are from those of a model; the cracks are left out.

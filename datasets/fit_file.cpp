@@ -315,6 +315,7 @@ void write(const Fit& fit, const std::filesystem::path& file) {
         root.write_text("message", fit.message, "why the fit ended");
         root.write_text("method", fit.method, "what did the work, and why it was chosen");
         root.write_text("study_text", fit.study_text, "the study in TOML as it was used");
+        root.write_text("scene_settings", fit.scene_settings, "what --set changed in the scenes");
         root.write<std::int64_t>("seed", fit.seed, {"1", "of everything that was drawn at random"});
         root.write("misfit", fit.misfit, {"1", "sum of squared weighted residuals at the best parameters"});
         root.write("reduced_chi_square", fit.reduced_chi_square, {"1", "misfit for each degree of freedom"});
@@ -341,6 +342,7 @@ Fit read_fit(const std::filesystem::path& file) {
     fit.message = root.read_text("message");
     fit.method = root.read_text("method");
     fit.study_text = root.read_text("study_text");
+    if (root.has("scene_settings")) fit.scene_settings = root.read_text("scene_settings");
     fit.seed = read_seed(root);
     fit.misfit = root.read_number<double>("misfit");
     fit.reduced_chi_square = root.read_number<double>("reduced_chi_square");

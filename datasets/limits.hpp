@@ -57,6 +57,7 @@ inline constexpr NumberRule bridging_stress = positive(dimension::pressure);
 inline constexpr NumberRule bridging_opening = positive(dimension::length);
 inline constexpr NumberRule advance = not_negative(dimension::length);
 inline constexpr NumberRule share{dimension::number, 0, 1, false, "must lie between 0 and 1"};
+inline constexpr NumberRule weight{dimension::number, 1e-9, 1e9, false, "must be greater than 0, from 1e-9 to 1e9"};
 inline constexpr NumberRule compliance = not_negative(dimension::compliance);
 inline constexpr NumberRule force_offset = finite(dimension::force);
 inline constexpr NumberRule displacement_offset = finite(dimension::length);

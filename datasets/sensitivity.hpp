@@ -58,6 +58,7 @@ struct Sensitivity {
     double seconds = 0;  // wall time [s]
     unsigned seed = 0;
     std::string study_text;
+    std::string scene_settings;  // what --set changed in the scenes, as it stands on a command line
 };
 
 }  // namespace crampfit

@@ -165,6 +165,7 @@ void write(const Sensitivity& sensitivity, const std::filesystem::path& file) {
         root.write_text("status", name(sensitivity.status), "how the study ended");
         root.write_text("message", sensitivity.message, "what there is to know about it");
         root.write_text("study_text", sensitivity.study_text, "the study in TOML as it was used");
+        root.write_text("scene_settings", sensitivity.scene_settings, "what --set changed in the scenes");
         root.write<std::int64_t>("seed", sensitivity.seed, {"1", "of everything that was drawn at random"});
         root.write("seconds", sensitivity.seconds, {"s", "wall time of the study"});
         Group parameters = root.make_group("parameters", "what was varied");
@@ -185,6 +186,7 @@ Sensitivity read_sensitivity(const std::filesystem::path& file) {
     sensitivity.status = read_status(root);
     sensitivity.message = root.read_text("message");
     sensitivity.study_text = root.read_text("study_text");
+    if (root.has("scene_settings")) sensitivity.scene_settings = root.read_text("scene_settings");
     sensitivity.seed = read_seed(root);
     sensitivity.seconds = root.read_number<double>("seconds");
     read_columns(root.group("parameters"), sensitivity.parameters, parameter_texts);

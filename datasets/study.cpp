@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace crampfit {
 namespace {
@@ -41,7 +42,19 @@ Noise read_noise(const Entry& entry, const Curves& data, bool has_fields) {
         if (column.empty()) {
             found->fail("the data have no such column");
         }
-        return std::optional(found->number(limits::positive(dimension)));
+        constexpr double last_digit = 1e-12;  // of a reading
+        const double noise = found->number(limits::positive(dimension));
+        double most = 0;
+        for (const double value : column) {
+            most = std::isnan(value) ? most : std::max(most, std::abs(value));
+        }
+        if (most > 0 && noise > most) {
+            found->fail("is more than any reading of the column: data that say nothing are left out");
+        }
+        if (noise < last_digit * most) {
+            found->fail("is less than the last digit of the column's readings");
+        }
+        return std::optional(noise);
     };
     const auto field = entry.find("displacement_field");
     if (field && !has_fields) {
@@ -65,6 +78,23 @@ Machine read_machine(const Entry& experiment, const Curves& data) {
     return machine;
 }
 
+// A crack as long as some reading must fit into the specimen.
+void check_crack_lengths(const Experiment& experiment) {
+    constexpr double clearly = 3.0;  // sigmas
+    const double noise = clearly * experiment.noise.crack_length.value_or(0.0);
+    const double longest = experiment.scene.specimen.size.sum();
+    for (std::size_t i = 0; i < experiment.data.crack_length.size(); ++i) {
+        const double length = experiment.data.crack_length[i];
+        if (length < -noise || length > longest + noise) {
+            throw InputError(experiment.data_file.string(), fmt::format("crack_length, reading {}", i + 1),
+                             fmt::format("{:g} mm", 1e3 * length),
+                             fmt::format("must lie between 0 and the {:g} mm of the specimen's width and height together; leave "
+                                         "the field empty for a gap",
+                                         1e3 * longest));
+        }
+    }
+}
+
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
     entry.only({"name", "scene", "data", "fields", "photograph", "noise", "weight", "compliance", "force_offset",
                 "displacement_offset"});
@@ -86,9 +116,10 @@ Experiment read_experiment(const Entry& entry, std::size_t number, const Overrid
     if (const auto noise = entry.find("noise")) {
         experiment.noise = read_noise(*noise, experiment.data, experiment.fields.has_value());
     }
+    check_crack_lengths(experiment);
     experiment.machine = read_machine(entry, experiment.data);
     if (const auto weight = entry.find("weight")) {
-        experiment.weight = weight->number(limits::positive(dimension::number));
+        experiment.weight = weight->number(limits::weight);
     }
     return experiment;
 }

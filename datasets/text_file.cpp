@@ -9,6 +9,9 @@ namespace crampfit {
 
 std::string read_text(const std::filesystem::path& file) {
     std::error_code error;
+    if (std::filesystem::is_directory(file, error)) {
+        throw InputError(file.string(), "", "", "is a folder: a file is needed");
+    }
     if (!std::filesystem::is_regular_file(file, error)) {
         throw InputError(file.string(), "", "", "there is no such file");
     }
@@ -24,6 +27,9 @@ std::string read_text(const std::filesystem::path& file) {
     }
     if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF")) {
         throw InputError(file.string(), "", "", "is UTF-16 text: save it as UTF-8");
+    }
+    if (content.find('\0') != std::string::npos) {
+        throw InputError(file.string(), "", "", "is no text");
     }
     return content;
 }

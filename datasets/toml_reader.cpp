@@ -290,6 +290,9 @@ Vec2 Entry::point() const {
 std::filesystem::path Entry::existing_file() const {
     const std::filesystem::path file = document_->file().parent_path() / text();
     std::error_code error;
+    if (std::filesystem::is_directory(file, error)) {
+        fail(fmt::format("is a folder, and a file is needed: {}", file.string()));
+    }
     if (!std::filesystem::is_regular_file(file, error)) {
         fail(fmt::format("there is no such file: {}", file.string()));
     }

@@ -103,7 +103,8 @@ std::vector<double> field_masses(const Discretisation& body, int fields) {
 Boundary::Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const MaterialMap* materials)
     : scene_(scene), body_(body), edges_(static_cast<int>(scene.edges.size())) {
     hold_nodes(cracks, materials);
-    place_tractions();
+    place_tractions(cracks);
+    follow(cracks);
 }
 
 // As tips that would run on into what is held: where a stretch of a side ends in whole wood that no other edge holds along an
@@ -147,7 +148,7 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
     std::vector<std::array<bool, 2>> taken(layout.nodes(), {false, false});
     const auto hold = [&](int node, int axis, int driver) {  // where two meet, the first in the list holds
         if (taken[node][axis]) {
-            if (driver < edges_) others_.push_back({node, axis, driver});
+            others_.push_back({node, axis, driver});
             return false;
         }
         taken[node][axis] = true;
@@ -209,36 +210,53 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
             throw InputError(scene_.file.string(), "bodies." + grip.name, "bonded",
                              "the body holds no node of the grid: it must overlap the specimen by a cell or so");
     }
-    hold_further_fields(cracks);
 }
 
-// Whether some point of a field has its domain at the edge, on the stretch of the side that it drives.
-bool Boundary::lies_at(const Edge& edge, int field, int node) const {
+// Whether a driver reaches wood of a field about its node.
+bool Boundary::reaches(const Reach& is_reached, int field, int node) const {
     bool found = false;
     body_.for_cells_near(body_.layout.node_position(node), 0.5 * body_.layout.cell.minCoeff(), [&](int c) {
         for (int p = body_.points.first_of_cell[c]; p < body_.points.first_of_cell[c + 1]; ++p) {
             const auto fields = body_.points.node[p];
-            if (std::find(fields.begin(), fields.end(), field) == fields.end()) continue;
-            const Box domain = body_.domain(p);
-            found |= (on_side(body_.layout, edge.side, domain.low) || on_side(body_.layout, edge.side, domain.high)) &&
-                     in_range(body_.layout, edge, body_.points.position[p]);
+            if (std::find(fields.begin(), fields.end(), field) != fields.end())
+                found |= is_reached(body_.points.position[p], body_.domain(p));
         }
-        for (const Sliver& sliver : body_.slivers_of(c, c + 1)) {
-            if (std::ranges::find(sliver.node, field) == sliver.node.end()) continue;
-            found |= (on_side(body_.layout, edge.side, sliver.low) || on_side(body_.layout, edge.side, sliver.high)) &&
-                     in_range(body_.layout, edge, sliver.position);
-        }
+        for (const Sliver& sliver : body_.slivers_of(c, c + 1))
+            if (std::ranges::find(sliver.node, field) != sliver.node.end())
+                found |= is_reached(sliver.position, {sliver.low, sliver.high});
     });
     return found;
+}
+
+// What lies at the edge's stretch of its side.
+Boundary::Reach Boundary::reach_of(const Edge& edge) const {
+    return [this, &edge](const Vec2& middle, const Box& wood) {
+        return (on_side(body_.layout, edge.side, wood.low) || on_side(body_.layout, edge.side, wood.high)) &&
+               in_range(body_.layout, edge, middle);
+    };
+}
+
+// What the body overlaps, or touches with a side of its outline, no crack in between.
+Boundary::Reach Boundary::reach_of(const Body& grip, const CrackFields& cracks) const {
+    return [this, &grip, &cracks](const Vec2& middle, const Box& wood) {
+        if (inside(grip.shape, middle)) return true;
+        const double hair = 1e-6 * body_.layout.cell.minCoeff();
+        const Vec2 place = nearest_on_outline(grip.shape, middle).position;
+        if ((wood.low - place).maxCoeff() > hair || (place - wood.high).maxCoeff() > hair) return false;
+        const auto* polygon = std::get_if<Polygon>(&grip.shape);
+        const auto is_there = [&](const Vec2& corner) { return (corner - place).norm() < hair; };
+        if (polygon && std::ranges::any_of(polygon->points, is_there)) return false;
+        for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k)
+            if (distance_to(cracks.lines[k].points, place) < hair || cracks.is_left(k, middle) != cracks.is_left(k, place))
+                return false;
+        return true;
+    };
 }
 
 void Boundary::hold_further_fields(const CrackFields& cracks) {
     const int nodes = body_.layout.nodes();
     std::vector<std::vector<int>> further(nodes);  // fields
     for (int f = nodes; f < cracks.fields(); ++f) further[cracks.node_of_field[f]].push_back(f);
-    const auto keeps = [&](int driver, int field, int node) {
-        return driver >= edges_ || lies_at(scene_.edges[driver], field, node);
-    };
 
     // All that would hold a node, first in the list first: a crack may cut a corner off, or part two stretches, so that its two
     // sides are held by one each, or one of them by none.
@@ -264,7 +282,11 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
             on_node = drivers.front();
         } else {
             const auto first_for = [&](int field) {
-                const auto driver = std::ranges::find_if(drivers, [&](int d) { return keeps(d, field, node); });
+                const auto keeps = [&](int d) {
+                    return reaches(d < edges_ ? reach_of(scene_.edges[d]) : reach_of(scene_.bodies[d - edges_], cracks), field,
+                                   node);
+                };
+                const auto driver = std::ranges::find_if(drivers, keeps);
                 return driver == drivers.end() ? -1 : *driver;
             };
             on_node = first_for(node);
@@ -290,44 +312,80 @@ void Boundary::hold_further_fields(const CrackFields& cracks) {
             Tied beyond = tied[i];
             Edge side = scene_.edges[beyond.driver];  // the tie is there for what is free beyond its stretch
             side.range.reset();
-            if (!lies_at(side, field, beyond.field)) continue;
+            if (!reaches(reach_of(side), field, beyond.field)) continue;
             beyond.field = field;
             tied.push_back(beyond);
         }
     }
 }
 
-void Boundary::place_tractions() {
+void Boundary::place_tractions(const CrackFields& cracks) {
     for (int e = 0; e < edges_; ++e) {
         const Edge& edge = scene_.edges[e];
         if (!edge.traction) continue;
-        int found = 0;
-        for (Facet facet : body_.facets) {
+        const int axis = along_side(edge.side);
+        std::vector<double> ends;  // of the stretch, and cracks' mouths
+        if (edge.range) ends = {edge.range->first, edge.range->second};
+        for (const CrackLine& line : cracks.lines)
+            for (const Vec2& end : {line.points.front(), line.points.back()})
+                if (on_side(body_.layout, edge.side, end)) ends.push_back(end[axis]);
+        std::ranges::sort(ends);
+        const std::size_t before = tractions.size();
+        for (const Facet& facet : body_.facets) {
             if (!on_side(body_.layout, edge.side, facet.position)) continue;
-            if (edge.range) {  // of the facet what lies in it
-                const int axis = along_side(edge.side);
-                const double from = facet.position[axis] - 0.5 * facet.length, to = facet.position[axis] + 0.5 * facet.length;
-                const double low = std::max(from, edge.range->first), high = std::min(to, edge.range->second);
-                if (high - low <= 1e-6 * facet.length) continue;
-                if (high - low < (1.0 - 1e-6) * facet.length) {
-                    facet.position[axis] = 0.5 * (low + high);
-                    facet.length = high - low;
-                    facet.weight = body_.values_at(body_.points.cell[facet.point], facet.position);
-                }
+            double low = facet.position[axis] - 0.5 * facet.length;
+            const double high = facet.position[axis] + 0.5 * facet.length;
+            const double least = 1e-6 * facet.length;
+            for (const double end : ends) {
+                if (end <= low + least || end >= high - least) continue;
+                place_traction(piece_of(facet, axis, low, end), e);
+                low = end;
             }
-            ++found;
-            tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, e});
-            if (body_.layout.degree == 1) continue;
-            // B-splines are integrated along the side by the points' own places, as the stress that holds against it is.
-            const Box domain = body_.domain(facet.point);
-            const int axis = along_side(edge.side);
-            Vec2 place = facet.position;
-            place[axis] = 0.5 * (domain.low[axis] + domain.high[axis]);
-            tractions.back().facet.weight = body_.values_at(body_.points.cell[facet.point], place);
+            place_traction(low == facet.position[axis] - 0.5 * facet.length ? facet : piece_of(facet, axis, low, high), e);
         }
-        if (found == 0)
+        if (tractions.size() == before)
             throw InputError(scene_.file.string(), "edges." + edge.name, "range", "no material lies on this stretch of the side");
     }
+}
+
+// Of a facet a piece.
+Facet Boundary::piece_of(Facet facet, int axis, double low, double high) const {
+    facet.position[axis] = 0.5 * (low + high);
+    facet.length = high - low;
+    facet.weight = body_.values_at(body_.points.cell[facet.point], facet.position);
+    return facet;
+}
+
+void Boundary::place_traction(const Facet& facet, int driver) {
+    const Edge& edge = scene_.edges[driver];
+    if (!in_range(body_.layout, edge, facet.position)) return;
+    tractions.push_back({facet, *edge.traction * facet.length * body_.layout.thickness, driver, {}});
+    if (body_.layout.degree == 1) return;
+    // B-splines are integrated along the side by the points' own places, as the stress that holds against it is.
+    const Box domain = body_.domain(facet.point);
+    const int axis = along_side(edge.side);
+    Vec2 place = facet.position;
+    place[axis] = 0.5 * (domain.low[axis] + domain.high[axis]);
+    tractions.back().facet.weight = body_.values_at(body_.points.cell[facet.point], place);
+}
+
+// A crack between a facet and its point, whose middle lies on one side of it: the facet goes with the other.
+void Boundary::load_own_sides(const CrackFields& cracks) {
+    for (Traction& t : tractions) {
+        const int p = t.facet.point;
+        const auto own = std::as_const(body_.points).node[p];
+        std::ranges::copy(own, t.field.begin());
+        for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k) {
+            if (cracks.is_left(k, t.facet.position) == cracks.is_left(k, body_.points.position[p])) continue;
+            t.field = cracks.fields_at(body_.points.cell[p], t.facet.position);
+            break;
+        }
+    }
+}
+
+void Boundary::follow(const CrackFields& cracks) {
+    hold_further_fields(cracks);
+    load_own_sides(cracks);
 }
 
 double Boundary::travel_time(int driver) const {
@@ -356,7 +414,7 @@ std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std:
         if (t.driver == driver) length += t.facet.length;
     for (const Traction& t : tractions)
         for (int k = 0; k < body_.layout.nodes_per_cell() && t.driver == driver; ++k)
-            load[body_.points.node[t.facet.point][k]] += t.facet.length / length * t.facet.weight[k] * direction;
+            load[t.field[k]] += t.facet.length / length * t.facet.weight[k] * direction;
     return load;
 }
 
@@ -368,7 +426,7 @@ Vec2 Boundary::moved(int driver, double time, const std::vector<Vec2>& displacem
         if (t.driver != driver) continue;
         length += t.facet.length;
         for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
-            sum += t.facet.length * t.facet.weight[k] * displacement[body_.points.node[t.facet.point][k]];
+            sum += t.facet.length * t.facet.weight[k] * displacement[t.field[k]];
     }
     return sum / length;
 }

@@ -2,6 +2,7 @@
 
 #include "forward/cracks.hpp"
 
+#include <functional>
 #include <vector>
 
 namespace crampfit {
@@ -27,6 +28,7 @@ class Boundary {
         Facet facet;
         Vec2 force;  // [N]
         int driver;
+        std::array<int, most_nodes> field;  // at the nodes that the facet's point sees, of its own side of each crack
     };
 
     /// Throws InputError where an edge or a bonded body meets nothing. A stretch of a side is held at its nodes, those at its
@@ -41,10 +43,10 @@ class Boundary {
     int drivers() const { return edges_ + static_cast<int>(scene_.bodies.size()); }
     int first_body() const { return edges_; }
 
-    /// Holds the fields of nodes as the cracks have come to lie: where a node has several, each by the first whose stretch its
-    /// wood lies on. So arms on either side of a crack's mouth are held each on its own, and wood beyond a crack that runs
-    /// alongside the edge moves freely.
-    void hold_further_fields(const CrackFields& cracks);
+    /// Holds and loads the fields of nodes as the cracks have come to lie. Where a node has several, each is held by the first
+    /// whose stretch its wood lies on, and tractions pull on that of their own side. So arms on either side of a crack's mouth
+    /// are held each on its own, and wood beyond a crack that runs alongside the edge moves freely.
+    void follow(const CrackFields& cracks);
 
     Vec2 velocity_of(int driver) const;          // while it moves [m/s]
     double travel_time(int driver) const;        // it stops then [s]; infinite: never
@@ -62,8 +64,15 @@ class Boundary {
     void hold_nodes(const CrackFields& cracks, const MaterialMap* materials);
     std::vector<CrackTip> ends_within(const Edge& edge, int axis, const CrackFields& cracks,
                                       const std::vector<double>& mass) const;
-    void place_tractions();
-    bool lies_at(const Edge& edge, int field, int node) const;
+    void hold_further_fields(const CrackFields& cracks);
+    void place_tractions(const CrackFields& cracks);
+    void place_traction(const Facet& facet, int driver);
+    Facet piece_of(Facet facet, int axis, double low, double high) const;
+    void load_own_sides(const CrackFields& cracks);
+    using Reach = std::function<bool(const Vec2& middle, const Box& wood)>;  // of a piece of wood: whether a driver is there
+    Reach reach_of(const Edge& edge) const;
+    Reach reach_of(const Body& grip, const CrackFields& cracks) const;
+    bool reaches(const Reach& is_reached, int field, int node) const;
 
     const Scene& scene_;
     const Discretisation& body_;

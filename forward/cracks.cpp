@@ -478,12 +478,13 @@ bool CrackFields::slide(int crack, bool at_end, double distance) {
 }
 
 Box CrackFields::window(const Vec2& from, const Vec2& to) const {
-    const Vec2 reach = 3.0 * body_->layout.cell;
+    constexpr double of_points = 3.0, of_domains = 6.0;  // cells; what another crack cuts off ends where this one comes near
+    const Vec2 reach = (cuts_domains_ && lines.size() > 1 ? of_domains : of_points) * body_->layout.cell;
     return {from.cwiseMin(to) - reach, from.cwiseMax(to) + reach};
 }
 
-std::array<int, most_nodes> CrackFields::fields_at(const Vec2& x) const {
-    std::array<int, most_nodes> fields = body_->layout.cell_nodes(body_->layout.cell_at(x));
+std::array<int, most_nodes> CrackFields::fields_at(int cell, const Vec2& x) const {
+    std::array<int, most_nodes> fields = body_->layout.cell_nodes(cell);
     for (int n = 0; n < body_->layout.nodes_per_cell(); ++n) {
         int& field = fields[n];
         const int node = field;
@@ -498,8 +499,9 @@ std::array<int, most_nodes> CrackFields::fields_at(const Vec2& x) const {
 
 Vec2 CrackFields::displacement_at(const Vec2& x, const std::vector<Vec2>& displacement) const {
     const Layout& layout = body_->layout;
-    const auto values = body_->values_at(layout.cell_at(x), x);
-    const auto fields = fields_at(x);
+    const int c = layout.cell_at(x);
+    const auto values = body_->values_at(c, x);
+    const auto fields = fields_at(c, x);
     Vec2 sum = Vec2::Zero();
     for (int k = 0; k < layout.nodes_per_cell(); ++k) sum += values[k] * displacement[fields[k]];
     return sum;

@@ -89,7 +89,7 @@ class CrackFields {
   public:
     /// A pair appears once the tip has gone `least_freed` of that way, or just before for a negative number. `tie` never
     /// becomes stiffer than it is at that share, if that is above 0.
-    /// With `cuts_domains` the points' domains are cut as the only crack goes (`Sliver`).
+    /// With `cuts_domains` the points' domains are cut as cracks go that are alone where they are (`Sliver`).
     CrackFields(const Scene& scene, Discretisation& body, const MaterialMap& materials, double least_freed,
                 bool cuts_domains = false);
 
@@ -121,8 +121,9 @@ class CrackFields {
     /// Where points change sides when a tip goes from one place to another.
     Box window(const Vec2& from, const Vec2& to) const;
 
-    /// The fields at the nodes that x's cell sees with which the material at x moves: the first `nodes_per_cell()` of these.
-    std::array<int, most_nodes> fields_at(const Vec2& x) const;
+    /// The fields at the nodes that a cell sees with which the material at x, in it or beside it, moves: the first
+    /// `nodes_per_cell()` of these.
+    std::array<int, most_nodes> fields_at(int cell, const Vec2& x) const;
 
     /// Of the material at x, from the fields' displacements [m].
     Vec2 displacement_at(const Vec2& x, const std::vector<Vec2>& displacement) const;
@@ -146,10 +147,11 @@ class CrackFields {
     bool is_inside(const Vec2& x) const;
     void sort_points(int crack, const Box& window);
     void cut_domains(const Box& window);
-    std::array<Vec2, 2> stretched(std::size_t piece) const;
-    bool goes_to(const Box& box) const;
-    bool lies_at_a_kink(const Vec2& x) const;
-    std::optional<Sliver> cut_off(int point, const std::vector<bool>& is_parted);
+    std::array<Vec2, 2> stretched(int crack, std::size_t piece) const;
+    bool goes_to(int crack, const Box& box) const;
+    int only_crack_at(int cell) const;
+    bool lies_at_a_kink(int crack, const Vec2& x) const;
+    std::optional<Sliver> cut_off(int crack, int point, const std::vector<unsigned>& parted);
     int field(int node, unsigned mask, int crack);
     void add_pairs(int node, unsigned mask);
     void renew_sides(int crack);

@@ -46,9 +46,9 @@ struct EnergyReleaseOptions {
 /// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces
 /// that touch or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the
 /// tip. K_I and K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left,
-/// seen toward the tip, ahead, and turns a crack clockwise. That (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree
-/// within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are near
-/// (`tips_test`).
+/// seen toward the tip, ahead, and turns a crack clockwise. At small strain (K_I^2 + K_II^2) / E' = G is not imposed: both ways
+/// to G agree within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are
+/// near (`tips_test`). In finite rotation K has the size that G asks for.
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 

@@ -114,7 +114,7 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     for (const auto& [added, from] : fields) displacement_.push_back(displacement_[from]);
     for (const auto& [added, from] : fields)
         if (!settled_.empty()) settled_.push_back(settled_[from]);
-    boundary_.hold_further_fields(cracks_);
+    boundary_.follow(cracks_);
     internal_force_.sort_cells();
     // A tip that ends, or comes near another crack, may cut a piece free.
     if (!cracks_.lines[crack].tip(at_end).inside || cracks_.lines.size() > 1) find_pieces(false);
@@ -188,7 +188,7 @@ void Equilibrium::find_forces() {
         face_energy_ += 0.5 * jump.dot(face_stiffness(pair) * jump) + drag.energy + drag.dissipated;
     }
     for (const Boundary::Traction& t : boundary_.tractions) {
-        for (int k = 0; k < 4; ++k) force_[body_.points.node[t.facet.point][k]] += t.facet.weight[k] * t.force;
+        for (int k = 0; k < 4; ++k) force_[t.field[k]] += t.facet.weight[k] * t.force;
         reaction_[t.driver] += t.force;
     }
     contact_energy_ = 0.0;
@@ -556,7 +556,7 @@ double Equilibrium::ties_energy() const {
 double Equilibrium::traction_work() const {
     double work = 0.0;
     for (const Boundary::Traction& t : boundary_.tractions)
-        for (int k = 0; k < 4; ++k) work += t.facet.weight[k] * t.force.dot(displacement_[body_.points.node[t.facet.point][k]]);
+        for (int k = 0; k < 4; ++k) work += t.facet.weight[k] * t.force.dot(displacement_[t.field[k]]);
     for (const Free& free : free_) work += free.force * moved_[free.driver][free.axis];
     return work;
 }

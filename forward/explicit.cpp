@@ -87,7 +87,7 @@ void ExplicitSolver::surface_forces() {
     for (const Boundary::Traction& t : boundary_.tractions) {
         Vec2 velocity = Vec2::Zero();
         for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) {
-            const int field = body_.points.node[t.facet.point][k];
+            const int field = t.field[k];
             force_[field] += t.facet.weight[k] * t.force;
             velocity += t.facet.weight[k] * velocity_[field];
         }

@@ -112,7 +112,7 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
         acceleration_.push_back(acceleration_[from]);
         force_.push_back(Vec2::Zero());
     }
-    boundary_.hold_further_fields(cracks_);
+    boundary_.follow(cracks_);
     list_held();
     mass_ = field_masses(body_, cracks_.fields());
     carry_over(cracks_.moves);

@@ -63,7 +63,7 @@ LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cra
     std::ranges::for_each(boundary.held, take_in);
     std::ranges::for_each(boundary.tied, take_in);
     for (std::size_t f = 0; f < piece.size(); ++f) left_alone[f] = weight[f] > heaviest;
-    for (const Boundary::Traction& t : boundary.tractions) left_alone[piece[body.points.node[t.facet.point][0]]] = true;
+    for (const Boundary::Traction& t : boundary.tractions) left_alone[piece[t.field[0]]] = true;
 
     LoosePieces found;
     found.loose.assign(piece.size(), false);

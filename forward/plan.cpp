@@ -360,7 +360,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const auto goes_straight = [](const Crack& crack) {
         return crack.grows == Growth::none || crack.direction == GrowthDirection::straight;
     };
-    plan.cuts_domains = plan.quasistatic && scene.cracks.size() == 1 && goes_straight(scene.cracks.front()) && !plan.remembers;
+    plan.cuts_domains =
+        plan.quasistatic && !scene.cracks.empty() && std::ranges::all_of(scene.cracks, goes_straight) && !plan.remembers;
     check_memory(scene, plan.quasistatic, materials, body);
     check_bridging(scene, plan.quasistatic, materials, body);
 
@@ -439,13 +440,14 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else
         choose("shape function", name_of(scene.solver.shape_function),
                "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
-    choose(
-        "strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
-        chosen
-            ? "asked for in solver.strain"
-            : fmt::format(
-                  "edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side; small strain up to {}",
-                  expected / smallest, bound));
+    const bool has_dead_load = std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
+                               std::ranges::any_of(scene.bodies, [](const Body& rigid) { return !rigid.force.isZero(0.0); });
+    choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
+           chosen ? "asked for in solver.strain"
+                  : fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side{}; small "
+                                "strain up to {}",
+                                expected / smallest,
+                                has_dead_load ? ", as far as is known: tractions and forces move them too" : "", bound));
     const std::string kind = materials.orthotropic() ? "orthotropic" : "isotropic";
     choose("material",
            materials.homogeneous() ? "one " + kind + " material"

@@ -15,7 +15,7 @@ struct Plan {
     bool driven = false;                 // some edge or body moves
     double still_from = 0;               // when everything that moves has come to its end [s]; infinite: never
     bool rotates = false;                // finite rotation; else small strain
-    bool cuts_domains = false;           // at equilibrium a straight crack cuts points' domains; else points lie on one side
+    bool cuts_domains = false;           // at equilibrium straight cracks cut points' domains; else points lie on one side
     bool grows = false;                  // some tip may grow
     bool contact = false;                // some body can touch and slide
     bool friction = false;               // some body or closed crack faces rub: a state hangs on the way to it

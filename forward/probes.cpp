@@ -19,8 +19,9 @@ std::vector<std::vector<Vec2>> read_probes(const Probes& probes, const Discretis
             for (auto& reading : readings) reading.back().setConstant(std::numeric_limits<double>::quiet_NaN());
             continue;
         }
-        const auto weights = body.values_at(layout.cell_at(place), place);
-        const auto fields = cracks.fields_at(place);
+        const int c = layout.cell_at(place);
+        const auto weights = body.values_at(c, place);
+        const auto fields = cracks.fields_at(c, place);
         for (std::size_t d = 0; d < displacements.size(); ++d)
             for (int k = 0; k < layout.nodes_per_cell(); ++k)
                 readings[d].back() += probes.weights[i % group] * weights[k] * (*displacements[d])[fields[k]];

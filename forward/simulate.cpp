@@ -79,50 +79,12 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
     }
 }
 
-// Whether that which was modelled as small strain was settled by an estimate, and ended so that its truth can be told: friction
-// hangs on the way to a state, which is not gone again here.
-bool small_strain_is_a_guess(const Scene& scene, const Plan& plan, const Record& record) {
-    const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
-    return ended && plan.grows && !plan.rotates && !plan.friction && scene.solver.strain == StrainMeasure::automatic;
-}
-
-// Says by how much turns of the wood, which small strain leaves out, would change the force, where that counts: at the farthest
-// that the edges go while the specimen carries a load.
-void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
-                        Quasistatic& walk, Record& record) {
-    constexpr double carries = 0.1;  // of the largest strain energy
-    constexpr double counts = 0.02;
-    constexpr double nothing = 1e-10;  // of what the whole specimen would hold, strained as far
-    const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
-    const double most = std::max_element(record.series.begin(), record.series.end(), lower)->strain_energy;
-    const auto last = std::find_if(record.series.rbegin(), record.series.rend(),
-                                   [&](const Instant& row) { return row.strain_energy >= carries * most; });
-    double stiffest = 0.0;
-    for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
-    const double strain = last->displacement / scene.specimen.size.maxCoeff();
-    if (most <= nothing * stiffest * strain * strain * scene.specimen.size.prod() * scene.model.thickness) return;
-    const SeriesPlace place{static_cast<std::size_t>(record.series.rend() - last - 1), 0.0};
-    const auto power = [&](bool rotates) {
-        Plan turned = plan;
-        turned.rotates = rotates;
-        turned.linear = plan.linear && !rotates;
-        Revisit revisit(scene, turned, materials, body, walk);
-        return revisit.to(record, place) ? revisit.equilibrium().power() : 0.0;
-    };
-    const double without = power(false), with = without != 0.0 ? power(true) : 0.0;
-    if (with == 0.0 || std::abs(with / without - 1.0) <= counts) return;
-    record.message +=
-        fmt::format("; small strain: turns of the wood would change the force by {:+.1f} % at {:.3g} mm, see solver.strain = "
-                    "\"finite rotation\"",
-                    100.0 * (with / without - 1.0), 1e3 * last->displacement);
-}
-
-// Says so where wood that was modelled by small strain has turned: under tractions no plan knows how far it will go.
-void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSolver& solver, Record& record) {
+// Says so where wood that was modelled by small strain has turned: under tractions and forces no plan knows how far it will go.
+void judge_turns(const Plan& plan, const Discretisation& body, const std::vector<Vec2>& displacement, Record& record) {
     constexpr double much = 0.9, counts = 0.1;  // of the points; more than so much [rad]: its false strain is half the square
     std::vector<double> turns;
     for (int p = 0; p < body.points.count() && !plan.rotates; ++p) {
-        const Mat2 gradient = gradient_at(body, p, solver.displacements());
+        const Mat2 gradient = gradient_at(body, p, displacement);
         turns.push_back(0.5 * std::abs(gradient(1, 0) - gradient(0, 1)));
     }
     if (turns.empty()) return;
@@ -133,6 +95,44 @@ void judge_turns(const Plan& plan, const Discretisation& body, const ExplicitSol
             fmt::format("; small strain: a tenth of the wood has turned by more than {:.2g} rad, see solver.strain = "
                         "\"finite rotation\"",
                         *at);
+}
+
+// Says where small strain may not be enough, at the farthest that the load goes while the specimen carries it. Of a crack that
+// grows as edges move: by how much turns of the wood would change the force. Not with friction, which hangs on the way to a
+// state: that is not gone again here.
+void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                        Quasistatic& walk, Record& record) {
+    constexpr double carries = 0.1;  // of the largest strain energy
+    constexpr double counts = 0.02;
+    constexpr double nothing = 1e-10;  // of what the whole specimen would hold, strained as far
+    const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
+    if (!ended || plan.rotates || plan.friction) return;
+    const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
+    const double most = std::max_element(record.series.begin(), record.series.end(), lower)->strain_energy;
+    const auto last = std::find_if(record.series.rbegin(), record.series.rend(),
+                                   [&](const Instant& row) { return row.strain_energy >= carries * most; });
+    double stiffest = 0.0;
+    for (int p = 0; p < body.points.count(); ++p) stiffest = std::max(stiffest, body.points.stiffest(p));
+    const double strain = last->displacement / scene.specimen.size.maxCoeff();
+    if (most <= nothing * stiffest * strain * strain * scene.specimen.size.prod() * scene.model.thickness) return;
+    const SeriesPlace place{static_cast<std::size_t>(record.series.rend() - last - 1), 0.0};
+    Revisit small(scene, plan, materials, body, walk);
+    if (!small.to(record, place)) return;
+    const double without = small.equilibrium().power();
+    if (!plan.grows || without == 0.0) {
+        judge_turns(plan, small.body(), small.equilibrium().displacements(), record);
+        return;
+    }
+    Plan turned = plan;
+    turned.rotates = true;
+    turned.linear = false;
+    Revisit large(scene, turned, materials, body, walk);
+    const double with = large.to(record, place) ? large.equilibrium().power() : 0.0;
+    if (with == 0.0 || std::abs(with / without - 1.0) <= counts) return;
+    record.message +=
+        fmt::format("; small strain: turns of the wood would change the force by {:+.1f} % at {:.3g} mm, see solver.strain = "
+                    "\"finite rotation\"",
+                    100.0 * (with / without - 1.0), 1e3 * last->displacement);
 }
 
 // How much wood there is straight ahead of a point [m].
@@ -290,7 +290,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     record.points = walk.points();
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, options, record);
     read_probes(scene, walk, record);
-    if (small_strain_is_a_guess(scene, plan, record)) judge_small_strain(scene, plan, materials, body, walk, record);
+    judge_small_strain(scene, plan, materials, body, walk, record);
     judge_advance(scene, body, record);
     return record;
 }
@@ -324,7 +324,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         recorder.add_step();
     }
     Record record = recorder.take();
-    judge_turns(plan, body, solver, record);
+    judge_turns(plan, body, solver.displacements(), record);
     judge_books(record);
     if (solver.fastest_crack() > 0.0) record.message += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());
     return record;

@@ -19,6 +19,9 @@ constexpr double reach_of_a_cut = 2.0;
 constexpr double reach_of_a_kink = 8.0;
 constexpr double least_cosine_at_a_kink = 0.94;  // 20 degrees
 
+// Nor where another crack passes within so many cells.
+constexpr double reach_of_another_crack = 3.0;
+
 }  // namespace
 
 // Cuts anew the domains of the points in a window.
@@ -26,25 +29,25 @@ void CrackFields::cut_domains(const Box& window) {
     const Layout& layout = body_->layout;
     const Points& points = body_->points;
     std::vector<Sliver>& slivers = body_->slivers;
-    std::vector<bool> is_parted(layout.nodes(), false);  // nodes where there are fields on either side
-    for (const FieldPair& pair : pairs) is_parted[pair.node] = true;
+    std::vector<unsigned> parted(layout.nodes(), 0u);  // bit k of a node: there are fields on either side of crack k
+    for (const FieldPair& pair : pairs) parted[pair.node] |= 1u << pair.crack;
     std::vector<Sliver> found;
     std::vector<bool> is_anew(layout.cells(), false);
     body_->for_cells_in(window, [&](int c) {
         is_anew[c] = true;
-        const Vec2 corner = layout.cell_corner(c);
-        if (!goes_to({corner, corner + layout.cell}) || lies_at_a_kink(corner + 0.5 * layout.cell)) return;
+        const int crack = only_crack_at(c);
+        if (crack < 0 || lies_at_a_kink(crack, layout.cell_corner(c) + 0.5 * layout.cell)) return;
         for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p)
-            if (const auto sliver = cut_off(p, is_parted)) found.push_back(*sliver);
+            if (const auto sliver = cut_off(crack, p, parted)) found.push_back(*sliver);
     });
     std::erase_if(slivers, [&](const Sliver& sliver) { return is_anew[points.cell[sliver.point]]; });
     slivers.insert(slivers.end(), found.begin(), found.end());
     std::ranges::sort(slivers, {}, &Sliver::point);
 }
 
-// The crack's straight pieces, both ends going on.
-std::array<Vec2, 2> CrackFields::stretched(std::size_t piece) const {
-    const auto& points = lines[0].points;
+// A crack's straight pieces, both ends going on.
+std::array<Vec2, 2> CrackFields::stretched(int crack, std::size_t piece) const {
+    const auto& points = lines[crack].points;
     std::array<Vec2, 2> ends{points[piece], points[piece + 1]};
     const Vec2 further = reach_of_a_cut * body_->layout.cell.maxCoeff() * (ends[1] - ends[0]).normalized();
     if (piece == 0) ends[0] -= further;
@@ -52,16 +55,28 @@ std::array<Vec2, 2> CrackFields::stretched(std::size_t piece) const {
     return ends;
 }
 
-bool CrackFields::goes_to(const Box& box) const {
-    for (std::size_t i = 0; i + 1 < lines[0].points.size(); ++i) {
-        const auto [from, to] = stretched(i);
+bool CrackFields::goes_to(int crack, const Box& box) const {
+    for (std::size_t i = 0; i + 1 < lines[crack].points.size(); ++i) {
+        const auto [from, to] = stretched(crack, i);
         if (box.touches({from.cwiseMin(to), from.cwiseMax(to)})) return true;
     }
     return false;
 }
 
-bool CrackFields::lies_at_a_kink(const Vec2& x) const {
-    const auto& points = lines[0].points;
+// The crack that goes to a cell, if no other comes near; else -1.
+int CrackFields::only_crack_at(int c) const {
+    const Vec2 corner = body_->layout.cell_corner(c), cell = body_->layout.cell;
+    int found = -1;
+    for (int k = 0; k < static_cast<int>(lines.size()); ++k)
+        if (goes_to(k, {corner, corner + cell})) found = k;
+    const Box about{corner - reach_of_another_crack * cell, corner + (1.0 + reach_of_another_crack) * cell};
+    for (int k = 0; found >= 0 && k < static_cast<int>(lines.size()); ++k)
+        if (k != found && goes_to(k, about)) return -1;
+    return found;
+}
+
+bool CrackFields::lies_at_a_kink(int crack, const Vec2& x) const {
+    const auto& points = lines[crack].points;
     const double reach = reach_of_a_kink * body_->layout.cell.maxCoeff();
     for (std::size_t k = 1; k + 1 < points.size(); ++k) {
         if ((points[k] - x).norm() > reach) continue;
@@ -71,15 +86,15 @@ bool CrackFields::lies_at_a_kink(const Vec2& x) const {
     return false;
 }
 
-// What the crack cuts off a point's domain, kinks within it left out; nothing where no wood follows that could take it.
-std::optional<Sliver> CrackFields::cut_off(int p, const std::vector<bool>& is_parted) {
+// What a crack cuts off a point's domain, kinks within it left out; nothing where no wood follows that could take it.
+std::optional<Sliver> CrackFields::cut_off(int crack, int p, const std::vector<unsigned>& parted) {
     const Layout& layout = body_->layout;
     const Points& points = body_->points;
     const Box domain = body_->domain(p);
     std::optional<Vec2> in;
     Vec2 out;
-    for (std::size_t i = 0; i + 1 < lines[0].points.size(); ++i) {
-        const auto [from, to] = stretched(i);
+    for (std::size_t i = 0; i + 1 < lines[crack].points.size(); ++i) {
+        const auto [from, to] = stretched(crack, i);
         const auto within = part_within(from, to, domain);
         if (!within) continue;
         if (!in) in = from + (*within)[0] * (to - from);
@@ -87,21 +102,22 @@ std::optional<Sliver> CrackFields::cut_off(int p, const std::vector<bool>& is_pa
     }
     const double hair = 1e-6 * layout.point_size().minCoeff();  // a corner that is touched has no direction
     if (!in || (out - *in).norm() < hair) return std::nullopt;
-    const bool left = is_left(0, points.position[p]);
+    const bool left = is_left(crack, points.position[p]);
     const Piece beyond = left ? left_part(domain, out, *in) : left_part(domain, *in, out);
     const double share = beyond.area / layout.point_size().prod();
-    if (share < least_sliver || share > most_sliver || is_left(0, beyond.middle) == left) return std::nullopt;
+    if (share < least_sliver || share > most_sliver || is_left(crack, beyond.middle) == left) return std::nullopt;
     const Vec2 off = (beyond.middle - 0.5 * (domain.low + domain.high)).cwiseQuotient(layout.point_size());
     const int axis = std::abs(off.x()) > std::abs(off.y()) ? 0 : 1;
     const int step = off[axis] > 0.0 ? 1 : -1;
     const int beside = body_->neighbour(p, axis == 0 ? step : 0, axis == 1 ? step : 0);
-    if (beside < 0 || is_left(0, points.position[beside]) == left) return std::nullopt;
+    if (beside < 0 || is_left(crack, points.position[beside]) == left) return std::nullopt;
+    const unsigned bit = 1u << crack;
     Sliver sliver{p, share, beyond.middle, beyond.moments, beyond.bounds.low, beyond.bounds.high, {}};
     const auto nodes = layout.cell_nodes(points.cell[p]);
     for (int k = 0; k < 4; ++k) {
-        const bool is_parted_here = is_parted[nodes[k]] || freed(0, nodes[k]) >= least_freed_;
-        const bool apart = is_left(0, layout.node_position(nodes[k])) == left && is_parted_here;
-        sliver.node[k] = field(nodes[k], apart ? 1u : 0u, 0);
+        const bool is_parted_here = (parted[nodes[k]] & bit) != 0u || freed(crack, nodes[k]) >= least_freed_;
+        const bool apart = is_left(crack, layout.node_position(nodes[k])) == left && is_parted_here;
+        sliver.node[k] = field(nodes[k], (mask_[p][k] & ~bit) | (apart ? bit : 0u), crack);
     }
     if (std::ranges::equal(sliver.node, std::as_const(points).node[p])) return std::nullopt;
     return sliver;

@@ -9,6 +9,7 @@
 #include "inverse/kept_walks.hpp"
 #include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
+#include "inverse/run_store.hpp"
 #include "inverse/search.hpp"
 #include "inverse/study_check.hpp"
 #include "inverse/study_model.hpp"
@@ -144,6 +145,9 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
                               std::numeric_limits<double>::infinity(),
                               ""};
     fill_parameters(fit, box, box.initial(), nothing);
+    for (FittedParameter& parameter : fit.parameters) {
+        parameter.value = std::numeric_limits<double>::quiet_NaN();
+    }
     fit.misfit = nothing.reduced_chi_square;
     fit.reduced_chi_square = nothing.reduced_chi_square;
     fit.message += objective.runs().empty()
@@ -205,6 +209,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     fit.method = found.method;
     fit.seed = options.seed;
     fit.study_text = study.text;
+    fit.scene_settings = scene_settings_text(study);
     if (!objective.best()) {
         fit.status = objective.stopped() ? FitStatus::interrupted : FitStatus::failed;
         fit.message = explain(fit.status);

@@ -37,20 +37,26 @@ InputError bad_data(const Experiment& experiment, const std::string& key, const 
 
 // A displacement that turns back leaves more than one force at it. Noise may turn it back a little.
 void check_rises(const Experiment& experiment, const std::vector<double>& abscissa, const char* column) {
+    const bool is_time = std::string_view(column) == "time";
+    const auto text = [&](double value) { return fmt::format("{:g} {}", (is_time ? 1 : 1e3) * value, is_time ? "s" : "mm"); };
     double low = INFINITY, high = -INFINITY, fall = 0;
-    for (const double value : abscissa) {
-        if (!std::isnan(value)) {
-            low = std::min(low, value);
-            high = std::max(high, value);
-            fall = std::max(fall, high - value);
+    std::string fallen;
+    for (std::size_t i = 0; i < abscissa.size(); ++i) {
+        if (std::isnan(abscissa[i])) {
+            continue;
+        }
+        low = std::min(low, abscissa[i]);
+        high = std::max(high, abscissa[i]);
+        if (high - abscissa[i] > fall) {
+            fall = high - abscissa[i];
+            fallen = fmt::format("{} in reading {}, after {}", text(abscissa[i]), i + 1, text(high));
         }
     }
     if (high - low <= 0) {
-        throw bad_data(experiment, column, fmt::format("{:g}", low),
-                       "all rows that can be compared stand there: two or more must differ");
+        throw bad_data(experiment, column, text(low), "all rows that can be compared stand there: two or more must differ");
     }
     if (fall > 0.05 * (high - low)) {
-        throw bad_data(experiment, column, fmt::format("{:g} after {:g}", high - fall, high),
+        throw bad_data(experiment, column, fallen,
                        "must rise through the test, and falls by more than a twentieth of its range; fit a part that rises");
     }
 }

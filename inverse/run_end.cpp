@@ -224,6 +224,29 @@ void check_rate(const Study& study, std::size_t experiment) {
     }
 }
 
+// Where the force was highest the specimen has moved too.
+void check_machine(const Study& study, std::size_t experiment, const Range& compliance, const Range& force_offset,
+                   const Range& offset) {
+    const Curves& data = study.experiments[experiment].data;
+    if (data.force.empty() || data.displacement.empty() || compliance.low <= 0) {
+        return;
+    }
+    std::size_t peak = 0;
+    double most = 0;
+    for (std::size_t i = 0; i < data.force.size(); ++i) {
+        if (!std::isnan(data.displacement[i]) && data.force[i] > most) {
+            peak = i;
+            most = data.force[i];
+        }
+    }
+    if (most > 0 && farthest(data.displacement[peak], most, compliance, force_offset, offset) <= 0) {
+        throw InputError(study.file.string(), fmt::format("experiments.{}.compliance", experiment),
+                         fmt::format("{:g} mm/N", 1e3 * compliance.low),
+                         fmt::format("under the highest force, {:g} N at {:g} mm, the machine alone would give way by {:g} mm",
+                                     most, 1e3 * data.displacement[peak], 1e3 * compliance.low * most));
+    }
+}
+
 }  // namespace
 
 CoveredData covered_data(const Study& study, std::size_t experiment) {
@@ -248,6 +271,7 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     const Range compliance = range_of(study, experiment, &Machine::compliance);
     const Range force_offset = range_of(study, experiment, &Machine::force_offset);
     const Range offset = range_of(study, experiment, &Machine::displacement_offset);
+    check_machine(study, experiment, compliance, force_offset, offset);
     double first = unbounded, last = -unbounded, beyond = unbounded;  // of the rows, and of those that no run need come to
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (std::isnan(abscissa[i])) {

@@ -166,6 +166,14 @@ void RunStore::keep_search(std::size_t n, std::uint64_t asked, const std::vector
     }
 }
 
+std::string scene_settings_text(const Study& study) {
+    std::string text;
+    for (const auto& [key, value] : study.scene_settings) {
+        text += " --set " + quoted_for_shell(key + "=" + value);
+    }
+    return text;
+}
+
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {
     if (evaluation.usable()) {
         return "";
@@ -173,9 +181,7 @@ std::string failure_text(const Study& study, const Eigen::VectorXd& values, cons
     std::string text = fmt::format("a run failed: {}; to run it again:", evaluation.status);
     for (const Scene* scene : scenes_of(study)) {
         text += "\n  crampfit simulate " + quoted_for_shell(scene->file.string());
-        for (const auto& [key, value] : study.scene_settings) {
-            text += " --set " + quoted_for_shell(key + "=" + value);
-        }
+        text += scene_settings_text(study);
         for (std::size_t j = 0; j < study.parameters.size(); ++j) {
             const Parameter& parameter = study.parameters[j];
             for (std::size_t k = 0; k < parameter.keys.size(); ++k) {

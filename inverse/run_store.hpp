@@ -55,6 +55,9 @@ class RunStore {
     std::size_t begun_ = 0;
 };
 
+/// What --set changed in the scenes of a study, as it stands on a command line after its other words.
+std::string scene_settings_text(const Study& study);
+
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one
 /// that did not fail.
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation);

@@ -7,6 +7,7 @@
 #include "inverse/objective.hpp"
 #include "inverse/output_model.hpp"
 #include "inverse/pool.hpp"
+#include "inverse/run_store.hpp"
 #include "inverse/saltelli.hpp"
 #include "inverse/study_check.hpp"
 #include "inverse/unit_box.hpp"
@@ -255,6 +256,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     Sensitivity result;
     result.seed = options.seed;
     result.study_text = study.text;
+    result.scene_settings = scene_settings_text(study);
     result.outputs = model.names();
     fill_parameters(model.box(), result);
 

@@ -67,9 +67,9 @@ class Undetermined {
                 is_member_[j] = true;
             }
         }
-        const std::string sentence = members.size() == 1
-                                         ? members.front() + " cannot be told from this data. "
-                                         : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
+        const std::string sentence =
+            members.size() == 1 ? members.front() + " cannot be told from this data: any value in its interval would do. "
+                                : fmt::format("{} cannot be told apart by this data. ", fmt::join(members, " and "));
         const auto is_same = [&](const Untold& other) { return other.sentence == sentence; };
         if (std::none_of(untold_.begin(), untold_.end(), is_same)) {  // several directions may be made of the same parameters
             untold_.push_back({parameters, sentence, direction / direction.cwiseAbs().maxCoeff()});

@@ -56,6 +56,7 @@ Fit small_fit() {
     Fit fit;
     fit.method = "Ceres, since derivatives are exact";
     fit.study_text = "title = \"E & G of a <block>\"\n";
+    fit.scene_settings = " --set 'model.cell=0.2 mm'";
     fit.parameters = {{.name = "E",
                        .key = "materials.EW.E",
                        .value = 40,
@@ -157,7 +158,7 @@ TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
     EXPECT_TRUE(contains(page, "<p>pull: weight 1.</p>"));
     for (const char* part :
          {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack", "Profile of E",
-          "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml -o fit.h5"})
+          "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml --set &#39;model.cell=0.2 mm&#39; -o fit.h5"})
         EXPECT_TRUE(contains(page, part)) << part;
     // A point for each: two curves with a legend each, their residuals, the profile, the samples, the runs that ended, their
     // legend.
@@ -213,7 +214,7 @@ TEST(SystemReport, PageOfASensitivityStudy) {
     study.runs = {{{40}, {1}, "finished", 1}, {{41}, {2}, "finished", 1}, {{42}, {nothing}, "failed <hard>", 1}};
     write(study, command.path("study.h5"));
     const std::string page = report(command, "study.h5");
-    for (const char* part : {"0.4 to 0.6", "2 of 3 runs ended well", "failed &lt;hard&gt;", "elasticity"})
+    for (const char* part : {"0.4 to 0.6", "<td>N / (MPa)</td>", "<td>local</td>", "2 of 3 runs ended well", "failed &lt;hard&gt;", "elasticity"})
         EXPECT_TRUE(contains(page, part)) << part;
 }
 

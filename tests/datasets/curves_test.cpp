@@ -55,7 +55,10 @@ TEST(UnitCurves, WhatIsWrongIsSaid) {
              {"force [N]\n1 N\n", "force, line 2", "finite number"},
              {"force [N]\ninf\n", "force, line 2", "finite number"},
              {"force [N]\nnan\n", "force, line 2", "leave the field empty"},
-             {"force [kN]\n1e307\n", "force, line 2", "too large"},
+             {"force [kN]\n1e307\n", "force, line 2", "no test reads more than 1e+09 N"},
+             {"displacement [mm],force [N]\n0,1\n1,9.9e37\n", "force, line 3", "leave the field empty"},
+             {"temperature [K]\n1\n", "column 1, line 1", "unknown column"},
+             {std::string("\x89PNG\0\r", 6), "", "no text"},
              {"force [N]\n1e999\n", "force, line 2", "finite number"},
              {"force [N],time [s]\n1,2,3\n", "row, line 2", "has 3 fields, but the head has 2 columns"},
              {"force [N],time [s]\n1\n", "row, line 2", "has 1 fields"},
@@ -77,4 +80,5 @@ TEST(UnitCurves, WhatIsWrongIsSaid) {
     }
     EXPECT_EQ(read_curves(folder.write("wide.csv", "time [s],\tforce [N]\n1,\t2\n")).force, std::vector<double>{2.0});
     EXPECT_THROW(read_curves(folder / "none.csv"), InputError);
+    EXPECT_THROW(read_curves(folder / ""), InputError);
 }

@@ -115,6 +115,7 @@ inline Fit full_fit() {
     fit.seconds = 3.25;
     fit.seed = 4000000000u;
     fit.study_text = "title = 'ü'";
+    fit.scene_settings = " --set 'model.cell=0.2 mm'";
     return fit;
 }
 
@@ -148,6 +149,7 @@ inline Sensitivity full_sensitivity() {
     sensitivity.seconds = 3.25;
     sensitivity.seed = 4000000000u;
     sensitivity.study_text = "title = 'ü'";
+    sensitivity.scene_settings = " --set 'model.cell=0.3 mm'";
     return sensitivity;
 }
 

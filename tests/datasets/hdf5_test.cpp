@@ -177,6 +177,7 @@ TEST(UnitHdf5, FitComesBackBitForBit) {
                           std::vector{before.misfit, before.reduced_chi_square, before.seconds}));
     EXPECT_EQ(after.seed, before.seed);
     EXPECT_EQ(after.study_text, before.study_text);
+    EXPECT_EQ(after.scene_settings, before.scene_settings);
 }
 
 TEST(UnitHdf5, TrackComesBackBitForBit) {
@@ -219,6 +220,7 @@ TEST(UnitHdf5, SensitivityRoundTrip) {
     EXPECT_EQ(after.status, before.status);
     EXPECT_EQ(after.message, before.message);
     EXPECT_EQ(after.study_text, before.study_text);
+    EXPECT_EQ(after.scene_settings, before.scene_settings);
     EXPECT_EQ(after.seed, before.seed);
     EXPECT_EQ(after.seconds, before.seconds);
     ASSERT_EQ(after.parameters.size(), before.parameters.size());

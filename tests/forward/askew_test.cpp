@@ -161,6 +161,36 @@ TEST(VerificationAskew, AnArmIsAsThickAsDrawn) {
     EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.005);
 }
 
+// Each of two cracks, far from each other, cuts the wood as it would alone: a block and its half up to the plane of symmetry.
+TEST(VerificationAskew, TwoArmsAreAsThickAsOne) {
+    const auto pull = [](const char* name, Side side, double speed) {
+        Edge arm = without(moving(name, side, {0.0, speed}), 0);
+        arm.range = {{0.0, 2e-3}};
+        return arm;
+    };
+    const auto force = [](Scene scene) {
+        scene.edges.push_back(without(moving("right", Side::right, {0.0, 0.0}), 1));
+        scene.measure = {"arm", "arm"};
+        scene.stop.time = 1.0;
+        StaticTrial run(scene, false);
+        EXPECT_TRUE(run.solve(1.0));
+        return run.equilibrium.reactions()[0].y();
+    };
+    for (const double y : {2.03e-3, 2.07e-3, 2.12e-3, 2.18e-3}) {
+        for (const double rise : {0.0, 0.1e-3}) {
+            Scene half = at_equilibrium(block({16e-3, 10e-3}, cell)), whole = at_equilibrium(block({16e-3, 20e-3}, cell));
+            Crack lower, upper;
+            lower.points = {Vec2(0.0, y), Vec2(6.03e-3, y + rise)};
+            upper.points = {Vec2(0.0, 20e-3 - y), Vec2(6.03e-3, 20e-3 - y - rise)};
+            half.cracks = {lower};
+            whole.cracks = {lower, upper};
+            half.edges = {pull("arm", Side::bottom, -1e-5), without(moving("middle", Side::top, {0.0, 0.0}), 0)};
+            whole.edges = {pull("arm", Side::bottom, -1e-5), pull("other", Side::top, 1e-5)};
+            EXPECT_NEAR(force(whole) / force(half), 1.0, 1e-6) << y << ' ' << rise;
+        }
+    }
+}
+
 // In motion, `advance` 0: a tip passes the places that give up least energy when the load is up to a tenth higher.
 TEST(VerificationAskew, InMotionACrackIsHardlyHeldBack) {
     double along_grid = 0.0;

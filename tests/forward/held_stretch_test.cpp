@@ -75,6 +75,27 @@ TEST(VerificationHeldStretch, EndsAtACracksMouth) {
             EXPECT_LT(std::abs(off), 0.005);
         }
     }
+    // Plates glued on the ends of the arms, as stretches of the side that hold them along both axes; plates that end off the
+    // grid's lines hold as if they did on the nearest one.
+    for (const double mouth : {5e-3, 5.2e-3, 5.3e-3}) {
+        Scene held = at_equilibrium(arms_of(mouth, 0.0, true));
+        for (const std::size_t e : {0u, 2u}) held.edges[e].velocity[0] = 0.0;
+        Scene glued = held;
+        glued.edges = {held.edges[1]};
+        for (const std::size_t e : {0u, 2u}) {
+            Body plate;
+            const auto [low, high] = *held.edges[e].range;
+            plate.name = held.edges[e].name;
+            plate.shape = Polygon{{{20e-3, low}, {22e-3, low}, {22e-3, high}, {20e-3, high}}};
+            plate.contact.kind = Contact::Kind::bonded;
+            plate.velocity = {0.0, *held.edges[e].velocity[1]};
+            glued.bodies.push_back(plate);
+        }
+        const double off = force(glued) / force(held) - 1;
+        std::printf("plates on both arms, mouth at %.1f mm: force within %.1e of that of stretches\n", 1e3 * mouth,
+                    std::abs(off));
+        EXPECT_LT(std::abs(off), mouth == 5e-3 ? 1e-9 : 0.02);
+    }
     // In motion a stretch ends at a node, so that what ends just beside the mouth holds half a cell less of an arm.
     const auto moving_arms = [&](double gap) {
         Scene scene = at_motion(arms_of(5e-3, gap, true));
@@ -87,6 +108,44 @@ TEST(VerificationHeldStretch, EndsAtACracksMouth) {
     const double off = moving_arms(0.0) / moving_arms(0.01e-3) - 1;
     std::printf("both arms in motion, mean force: %+.1f %% off that just beside the mouth\n", 100 * off);
     EXPECT_LT(std::abs(off), 0.1);
+}
+
+TEST(VerificationTraction, OnOneArmEndsAtACracksMouth) {
+    // A long strip split at one end, one arm drawn out along itself: the energy of beams under a force and its moment about the
+    // middle of the whole, on either side of the tip.
+    constexpr double height = 10e-3, stress = 0.1e6;
+    const auto rate = [&](double mouth, bool upper, double cell) {
+        Scene scene = block({60e-3, height}, cell);
+        Crack crack;
+        crack.points = {Vec2(60e-3, mouth), Vec2(30e-3, mouth)};
+        scene.cracks = {crack};
+        Edge pull = moving("pull", Side::right, {0.0, 0.0});
+        pull.traction = Vec2(stress, 0.0);
+        pull.range = upper ? std::pair{mouth, height} : std::pair{0.0, mouth};
+        scene.edges = {pull, moving("left", Side::left, {0.0, 0.0})};
+        scene.measure = {"pull", "pull"};
+        scene.stop.time = 1.0;
+        return simulate(at_equilibrium(scene)).series.back().G;
+    };
+    const double plane_modulus = earlywood().youngs_modulus / (1.0 - earlywood().poisson_ratio * earlywood().poisson_ratio);
+    for (const double cell : {1e-3, 0.5e-3}) {
+        double least = 1.0, most = -1.0;
+        for (int k = 0; k <= 10; ++k) {
+            for (const bool upper : {true, false}) {
+                const double mouth = 4.5e-3 + 0.1 * k * cell;
+                const double arm = upper ? height - mouth : mouth, off = 0.5 * (height - arm);
+                const double force = stress * arm;
+                const double exact =
+                    0.5 * force * force / plane_modulus * (1.0 / arm - 1.0 / height - 12.0 * off * off / std::pow(height, 3));
+                const double error = rate(mouth, upper, cell) / exact - 1;
+                least = std::min(least, error);
+                most = std::max(most, error);
+            }
+        }
+        std::printf("one arm of 4.5 to 5.5 mm drawn out, cells of %.1f mm: G %+.2f to %+.2f %% off beams\n", 1e3 * cell,
+                    100 * least, 100 * most);
+        EXPECT_LT(std::max(-least, most), 0.01);
+    }
 }
 
 TEST(VerificationHeldStretch, IsHalfACrackWhereItTurnsFar) {
