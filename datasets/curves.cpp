@@ -128,6 +128,9 @@ void read_row(std::string_view line, std::size_t number, const std::vector<Colum
 
 Curves read_curves(const std::filesystem::path& file) {
     const std::string text = read_text(file);
+    if (text.find('\0') != std::string::npos) {
+        throw InputError(file.string(), "", "", "is no text");
+    }
     Curves curves;
     std::vector<Column> columns;
     std::size_t rows = 0;

@@ -28,9 +28,6 @@ std::string read_text(const std::filesystem::path& file) {
     if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF")) {
         throw InputError(file.string(), "", "", "is UTF-16 text: save it as UTF-8");
     }
-    if (content.find('\0') != std::string::npos) {
-        throw InputError(file.string(), "", "", "is no text");
-    }
     return content;
 }
 

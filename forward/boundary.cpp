@@ -401,11 +401,6 @@ Vec2 Boundary::velocity_of(int driver) const {
 
 Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
 
-bool Boundary::has_dead_load() const {
-    const auto is_loaded = [](const Body& rigid) { return !rigid.force.isZero(0.0); };
-    return !tractions.empty() || std::any_of(scene_.bodies.begin(), scene_.bodies.end(), is_loaded);
-}
-
 std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std::size_t fields) const {
     if (driver >= edges_ || !scene_.edges[driver].traction) return {};
     std::vector<Vec2> load(fields, Vec2::Zero());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "forward/cracks.hpp"
+#include "forward/loading.hpp"
 
 #include <functional>
 #include <vector>
@@ -51,7 +52,7 @@ class Boundary {
     Vec2 velocity_of(int driver) const;          // while it moves [m/s]
     double travel_time(int driver) const;        // it stops then [s]; infinite: never
     Vec2 travel(int driver, double time) const;  // how far it has gone, where it is prescribed [m]
-    bool has_dead_load() const;                  // a traction, or a force on a body, which do not go with time
+    bool has_dead_load() const { return crampfit::has_dead_load(scene_); }
 
     /// How far a driver has gone, prescribed or, under traction, on average over its facets [m].
     Vec2 moved(int driver, double time, const std::vector<Vec2>& displacement) const;

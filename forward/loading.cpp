@@ -39,10 +39,9 @@ double end_time(const Scene& scene) {
 
 bool may_end(const Scene& scene) {
     if (std::isfinite(end_time(scene))) return true;
-    const bool is_loaded =
-        farthest_motion(scene, infinity) > 0.0 ||
-        std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
-        std::ranges::any_of(scene.bodies, [](const Body& body) { return !body.force.isZero(0.0); });
+    const bool is_loaded = farthest_motion(scene, infinity) > 0.0 ||
+                           std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
+                           std::ranges::any_of(scene.bodies, [](const Body& body) { return !body.force.isZero(0.0); });
     const auto measured = [&](const auto& driver) { return driver.name == scene.measure.displacement; };
     const bool follows =
         std::ranges::any_of(scene.edges, [&](const Edge& edge) { return measured(edge) && edge.traction; }) ||
@@ -84,6 +83,11 @@ Travel travel_of(const Scene& scene) {
     if (travel.fastest > 0.0) travel.until = last;
     travel.together = travel.fastest == 0.0 || first == last;
     return travel;
+}
+
+bool has_dead_load(const Scene& scene) {
+    return std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
+           std::ranges::any_of(scene.bodies, [](const Body& rigid) { return !rigid.force.isZero(0.0); });
 }
 
 }  // namespace crampfit

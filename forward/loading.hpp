@@ -32,6 +32,9 @@ double farthest_motion(const Scene& scene, double end);
 /// toughness and the softest wood's stiffness, and half as far again for arrests [m].
 double splitting_motion(const Scene& scene, const Discretisation& body);
 
+/// Whether there is a traction, or a force on a body, which do not go with time.
+bool has_dead_load(const Scene& scene);
+
 /// What moves, how fast, until when.
 struct Travel {
     double fastest = 0.0;                                    // [m/s]

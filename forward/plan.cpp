@@ -380,6 +380,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const double bound = needed < motion ? most_expected_rotation : most_rotation;
     const bool chosen = scene.solver.strain != StrainMeasure::automatic;
     plan.rotates = chosen ? scene.solver.strain == StrainMeasure::finite_rotation : expected > bound * smallest;
+    plan.may_turn = !plan.rotates && (plan.grows || has_dead_load(scene) || expected > bound * smallest);
     plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && !plan.remembers && travel.together;
     if (plan.quasistatic && !plan.linear && (plan.driven || plan.remembers) && !std::isfinite(plan.end_time))
         refuse(scene, "stop", "crack_length alone",
@@ -440,14 +441,12 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     else
         choose("shape function", name_of(scene.solver.shape_function),
                "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
-    const bool has_dead_load = std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
-                               std::ranges::any_of(scene.bodies, [](const Body& rigid) { return !rigid.force.isZero(0.0); });
     choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
            chosen ? "asked for in solver.strain"
                   : fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side{}; small "
                                 "strain up to {}",
                                 expected / smallest,
-                                has_dead_load ? ", as far as is known: tractions and forces move them too" : "", bound));
+                                has_dead_load(scene) ? ", as far as is known: tractions and forces move them too" : "", bound));
     const std::string kind = materials.orthotropic() ? "orthotropic" : "isotropic";
     choose("material",
            materials.homogeneous() ? "one " + kind + " material"

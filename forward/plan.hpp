@@ -15,6 +15,7 @@ struct Plan {
     bool driven = false;                 // some edge or body moves
     double still_from = 0;               // when everything that moves has come to its end [s]; infinite: never
     bool rotates = false;                // finite rotation; else small strain
+    bool may_turn = false;               // small strain, and nothing tells beforehand that it is enough
     bool cuts_domains = false;           // at equilibrium straight cracks cut points' domains; else points lie on one side
     bool grows = false;                  // some tip may grow
     bool contact = false;                // some body can touch and slide

@@ -106,7 +106,7 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
     constexpr double counts = 0.02;
     constexpr double nothing = 1e-10;  // of what the whole specimen would hold, strained as far
     const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;
-    if (!ended || plan.rotates || plan.friction) return;
+    if (!ended || !plan.may_turn || plan.friction) return;
     const auto lower = [](const Instant& a, const Instant& b) { return a.strain_energy < b.strain_energy; };
     const double most = std::max_element(record.series.begin(), record.series.end(), lower)->strain_energy;
     const auto last = std::find_if(record.series.rbegin(), record.series.rend(),

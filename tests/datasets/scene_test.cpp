@@ -438,7 +438,7 @@ TEST(UnitScene, UnknownWordsAndReferences) {
         {picture_scene, "material = \"LW\"", "material = \"XX\"", "specimen.classes.1.material", "no [materials.XX]"},
         {picture_scene, "\"graded\"", "\"sharp\"", "specimen.between", "must be one of \"graded\""},
         {picture_scene, "\"block.png\"", "\"none.png\"", "specimen.image", "no such file"},
-        {picture_scene, "\"block.png\"", "\".\"", "specimen.image", "no such file"},
+        {picture_scene, "\"block.png\"", "\".\"", "specimen.image", "is a folder"},
         {picture_scene, "\"angles.png\"", "\"none.png\"", "specimen.orientation", "no such file"},
         {plain_scene, "material = \"EW\"", "file = \"none.h5\"", "specimen.file", "no such file"},
     });
