@@ -371,10 +371,16 @@ void Boundary::place_traction(const Facet& facet, int driver) {
 
 // A crack between a facet and its point, whose middle lies on one side of it: the facet goes with the other.
 void Boundary::load_own_sides(const CrackFields& cracks) {
+    if (tractions.empty()) return;
+    std::vector<bool> is_parted(body_.layout.nodes(), false);
+    for (const FieldPair& pair : cracks.pairs) is_parted[pair.node] = true;
     for (Traction& t : tractions) {
         const int p = t.facet.point;
         const auto own = std::as_const(body_.points).node[p];
         std::ranges::copy(own, t.field.begin());
+        const auto nodes = body_.layout.cell_nodes(body_.points.cell[p]);
+        const auto seen = nodes.begin() + body_.layout.nodes_per_cell();
+        if (std::none_of(nodes.begin(), seen, [&](int node) { return is_parted[node]; })) continue;
         for (int k = 0; k < static_cast<int>(cracks.lines.size()); ++k) {
             if (cracks.is_left(k, t.facet.position) == cracks.is_left(k, body_.points.position[p])) continue;
             t.field = cracks.fields_at(body_.points.cell[p], t.facet.position);
@@ -385,6 +391,13 @@ void Boundary::load_own_sides(const CrackFields& cracks) {
 
 void Boundary::follow(const CrackFields& cracks) {
     hold_further_fields(cracks);
+    load_own_sides(cracks);
+}
+
+void Boundary::go_back(const Holds& holds, const CrackFields& cracks) {
+    held = holds.held;
+    others_ = holds.others;
+    tied = holds.tied;
     load_own_sides(cracks);
 }
 

@@ -37,6 +37,11 @@ class Boundary {
     /// held across is half a crack, and its displacements are as singular: the end is seen as a tip is, by a tie to the edge.
     Boundary(const Scene& scene, const Discretisation& body, const CrackFields& cracks, const MaterialMap* materials = nullptr);
 
+    struct Holds {  // all that hangs on where the cracks lie
+        std::vector<Held> held, others;
+        std::vector<Tied> tied;
+    };
+
     std::vector<Held> held;
     std::vector<Tied> tied;
     std::vector<Traction> tractions;
@@ -48,6 +53,9 @@ class Boundary {
     /// whose stretch its wood lies on, and tractions pull on that of their own side. So arms on either side of a crack's mouth
     /// are held each on its own, and wood beyond a crack that runs alongside the edge moves freely.
     void follow(const CrackFields& cracks);
+
+    Holds holds() const { return {held, others_, tied}; }
+    void go_back(const Holds& holds, const CrackFields& cracks);  // to where the cracks lay then
 
     Vec2 velocity_of(int driver) const;          // while it moves [m/s]
     double travel_time(int driver) const;        // it stops then [s]; infinite: never

@@ -620,15 +620,14 @@ void Equilibrium::mark_moved_points(const PointTable<int>& before, const std::ve
 }
 
 Equilibrium::Snapshot Equilibrium::save() const {
-    return {cracks_, body_.points.node, body_.slivers, boundary_.held, boundary_.tied, pieces_, displacement_, time_, contacts()};
+    return {cracks_, body_.points.node, body_.slivers, boundary_.holds(), pieces_, displacement_, time_, contacts()};
 }
 
 void Equilibrium::restore(const Snapshot& snapshot) {
     cracks_ = snapshot.cracks;
     const PointTable<int> before = std::exchange(body_.points.node, snapshot.node);
     const std::vector<Sliver> slivers_before = std::exchange(body_.slivers, snapshot.slivers);
-    boundary_.held = snapshot.held;
-    boundary_.tied = snapshot.tied;
+    boundary_.go_back(snapshot.holds, cracks_);
     pieces_ = snapshot.pieces;
     drop_hinges();
     displacement_ = snapshot.displacement;

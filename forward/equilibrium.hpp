@@ -118,8 +118,7 @@ class Equilibrium {
         CrackFields cracks;
         PointTable<int> node;
         std::vector<Sliver> slivers;
-        std::vector<Boundary::Held> held;
-        std::vector<Boundary::Tied> tied;
+        Boundary::Holds holds;
         LoosePieces pieces;
         std::vector<Vec2> displacement;
         double time;

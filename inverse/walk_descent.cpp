@@ -396,7 +396,7 @@ SearchResult descend_by_walks(Objective& objective, const Nearby& nearby, int st
         "auto: steps to the lowest point nearby, each confirmed by a run; nearby, equilibria that are known serve other "
         "toughnesses as "
         "they are, and other moduli moved by their exact derivatives. From {}, and from others, up to {}, while the "
-        "noise does not explain the misfit. Chosen because all parameters are such. {} descents, {} runs.",
+        "noise does not explain the misfit. Chosen because all parameters are such. Descents: {}; runs on the way: {}.",
         nearby.ways_differ ? "the lowest of some starting points, as the parameters turn the crack" : "the initial values",
         from.size(), descents, objective.runs().size());
     if (unconfirmed > 0) {
