@@ -305,7 +305,7 @@ bool CrackFields::wood_lies_ahead(const CrackTip& tip, double distance) const {
     for (double way = reach_of_an_end * cell; way < distance; way += 0.25 * cell) {
         const Vec2 x = tip.position + way * tip.direction;
         if ((x.array() < specimen.low.array()).any() || (x.array() > specimen.high.array()).any()) return false;
-        if (body_->point_at(x) >= 0) return true;
+        if (body_->point_at(x) >= 0 && has_wood(scene_->specimen, x)) return true;  // a point's corner may cover a void
     }
     return false;
 }

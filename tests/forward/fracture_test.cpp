@@ -197,6 +197,32 @@ TEST(VerificationEnergy, TheCrackOfAGridIsAsLongAsDrawn) {
         }
 }
 
+TEST(VerificationNotch, ACrackFromItsRootIsAsOneFromItsMouth) {
+    // A narrow notch, half as wide as a fifth of its depth, lies in the shadow of its crack: force and G are those of an edge
+    // crack as long as both.
+    for (const double cell : {0.4e-3, 0.2e-3}) {
+        const auto last = [&](double from, bool notched) {
+            Scene scene = at_equilibrium(block({20e-3, 20e-3}, cell));
+            if (notched) scene.specimen.cutouts = {Polygon{{{0.0, 9.1e-3}, {5.3e-3, 10.1e-3}, {0.0, 11.1e-3}}}};
+            Crack crack;
+            crack.points = {Vec2(from, 10.1e-3), Vec2(7.2e-3, 10.1e-3)};
+            scene.cracks = {crack};
+            scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.measure = {"top", "top"};
+            scene.stop.displacement = 0.1e-3;
+            return simulate(scene).series.back();
+        };
+        const Instant plain = last(0.0, false);
+        for (const double from : {0.0, 5.2e-3, 5.3e-3}) {
+            const Instant notched = last(from, true);
+            std::printf("cells of %.1f mm, crack from %.1f mm: force %+.2f %%, G %+.2f %% off that without the notch\n",
+                        1e3 * cell, 1e3 * from, 100 * (notched.force / plain.force - 1), 100 * (notched.G / plain.G - 1));
+            EXPECT_NEAR(notched.force, plain.force, 0.002 * plain.force);
+            EXPECT_NEAR(notched.G, plain.G, 0.005 * plain.G);
+        }
+    }
+}
+
 TEST(UnitCrackFaces, TouchButDoNotPassInMotion) {
     // Pressed together, a cracked block is as stiff as a whole one; faces overlap by what their penalty yields.
     double force[2];

@@ -99,6 +99,25 @@ TEST(VerificationCrackTip, SmallOpeningsAndNoise) {
     }
 }
 
+// Of a short crack few points lie beside it, and none between its torn faces: its direction is the middle of what they leave, and
+// its length is that to the border along it.
+TEST(VerificationCrackTip, ShortCracksAreAsLongAsDrawn) {
+    VirtualCameraOptions options;
+    options.columns = 400;
+    options.rows = 300;
+    VirtualTest test(options);
+    for (const double opening : {1.0, 3.0}) {
+        for (const double x : {60.3, 70.6, 85.2, 100.4}) {
+            const CrackTip tip = test.tip(crack_field({x, 140.3}, 0, opening, 0, {2.3, -1.7}));
+            ASSERT_EQ(tip.status, TipStatus::ok) << x;
+            std::printf("opening %.0f px, crack of %.1f px: tip off by %+.2f px, said %.2f px, length by %+.2f px\n", opening,
+                        x + 0.5, tip.tip.x() - x, tip.sigma, tip.length - x - 0.5);
+            EXPECT_LT(std::abs(tip.tip.x() - x), 3 * tip.sigma + 1);
+            EXPECT_NEAR(tip.length, tip.tip.x() + 0.5, 1.0);
+        }
+    }
+}
+
 // Layers of unlike strain along the crack are no part of the series: the tip may be off, as far as it says.
 TEST(VerificationCrackTip, LayersAreInTheStandardError) {
     VirtualCameraOptions options;
