@@ -18,6 +18,8 @@ namespace {
 
 constexpr double cells_of_coarsest = 16;  // across the smaller side
 constexpr double most_cells_tried = 128;
+constexpr double most_advances_a_cell =
+    2.0;  // of a grid tried; of the chosen one 1: over less the load goes in steps with the grid
 constexpr double most_cells_chosen = 512;
 constexpr int multiple = 4;      // of cells: places on lines of the grids tried lie on lines of the chosen one
 constexpr double safety = 1.25;  // Roache's, for three grids
@@ -120,9 +122,18 @@ const Estimate& worst_of(const std::vector<Estimate>& estimates, double cells) {
                              [&](const Estimate& a, const Estimate& b) { return a.at(cells) < b.at(cells); });
 }
 
-// The fewest cells that meet the error; more than `most_cells_chosen` where none do.
-double fewest_cells(const std::vector<Estimate>& estimates, double asked) {
+// The fewest cells, a multiple, that are no wider than so many of the advances over which cracks balance energy.
+double least_cells(const Scene& scene, double advances_a_cell) {
     double cells = cells_of_coarsest;
+    for (const Crack& crack : scene.cracks)
+        if (crack.grows != Growth::none && crack.advance > 0.0)
+            cells = std::max(cells, scene.specimen.size.minCoeff() / (advances_a_cell * crack.advance));
+    return multiple * std::ceil(cells / multiple - 1e-9);
+}
+
+// The fewest cells that meet the error, from `least` on; more than `most_cells_chosen` where none do.
+double fewest_cells(const std::vector<Estimate>& estimates, double asked, double least) {
+    double cells = least;
     while (cells <= most_cells_chosen && worst_of(estimates, cells).at(cells) > asked) cells += multiple;
     return cells;
 }
@@ -148,7 +159,9 @@ GridChoice choose_grid(const Scene& scene, double error) {
     std::vector<Trial> trials;
     std::vector<Estimate> estimates;
     double chosen = most_cells_chosen + multiple;
-    for (double cells = cells_of_coarsest; cells <= most_cells_tried; cells *= 2.0) {
+    const double coarsest = std::min(least_cells(scene, most_advances_a_cell), most_cells_tried / 4.0);
+    const double least = least_cells(scene, 1.0);
+    for (double cells = coarsest; cells <= most_cells_tried; cells *= 2.0) {
         const auto trial = try_grid(scene, cells);
         if (!trial) {
             trials.clear();
@@ -159,13 +172,13 @@ GridChoice choose_grid(const Scene& scene, double error) {
         if (n < 3) continue;
         estimates = estimates_of(trials[n - 3], trials[n - 2], trials[n - 1]);
         if (estimates.empty()) continue;
-        chosen = std::max(fewest_cells(estimates, error), trials.front().cells);
+        chosen = std::max(fewest_cells(estimates, error, least), trials.front().cells);
         if (chosen <= 2.0 * cells) break;  // else so far beyond the grids tried that one more is worth it
     }
     if (estimates.empty())
         refuse(scene, error,
-               fmt::format("not three of the grids with 16 to {:g} cells across gave a result to compare: give model.cell",
-                           most_cells_tried));
+               fmt::format("not three of the grids with {:g} to {:g} cells across gave a result to compare: give model.cell",
+                           coarsest, most_cells_tried));
     if (chosen > most_cells_chosen)
         refuse(scene, error,
                fmt::format("{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell",
