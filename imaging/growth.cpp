@@ -11,11 +11,13 @@
 namespace crampfit {
 namespace {
 
-constexpr double plain_skewness = 0.15;  // of the steps' cubes, -1..1
+constexpr double plain_skewness = 0.15;  // of the steps' squares, -1..1
 constexpr double plain_spread = 0.05;    // of the radial direction across the picture [rad]
 constexpr double least_share = 1.0 / 3;  // of the directions' variance, that is the spread: of waves it is less
 
-/// Sum of the cubes of gray's steps down the straightened columns, over that of their sizes.
+/// How much steeper gray rises than it falls down the straightened columns: the difference of the steps' mean squares over their
+/// sum, -1..1. Rises and falls have a mean each, as a picture of few rings has more of the one than of the other; steep steps
+/// weigh more, noise hardly anything.
 double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordinate& rings) {
     const StraightPicture straight = StraightWood(gray, valid, rings).blurred_along(std::clamp(gray.cols / 60.0, 1.0, 20.0));
     cv::Mat smooth, slope, unknown;
@@ -23,9 +25,13 @@ double step_skewness(const cv::Mat& gray, const cv::Mat& valid, const RingCoordi
     cv::sepFilter2D(smooth, slope, CV_32F, cv::Mat::ones(1, 1, CV_32F), cv::Mat(cv::Vec3f(-0.5f, 0, 0.5f)));
     cv::dilate(straight.known < 0.9, unknown, cv::Mat::ones(11, 1, CV_8U));
     slope.setTo(0, unknown);
-    const cv::Mat size = cv::abs(slope);
-    const double all = cv::sum(size.mul(size).mul(size))[0];
-    return all > 0 ? cv::sum(slope.mul(slope).mul(slope))[0] / all : 0;
+    const auto steepness = [](const cv::Mat& steps) {
+        const cv::Mat squares = steps.mul(steps);
+        const double all = cv::sum(squares)[0];
+        return all > 0 ? std::pow(cv::sum(squares.mul(steps))[0] / all, 2) : 0;
+    };
+    const double rise = steepness(cv::max(slope, 0)), fall = steepness(cv::max(-slope, 0));
+    return rise > 0 && fall > 0 ? (rise - fall) / (rise + fall) : 0;
 }
 
 /// How far the directions turn outward from one side of the frame to the other [rad]; 0 where that is but waves' chance.

@@ -177,6 +177,20 @@ TEST(UnitDrawnRings, WavesDoNotTellTheGrowth) {
     }
 }
 
+// A picture of one or two rings has more rises than falls, or fewer: with steps alike both ways its arcs tell the growth.
+TEST(UnitDrawnRings, FewWideRingsTellTheGrowthByTheirArcs) {
+    for (const double start : {430.0, 475.0, 520.0, 655.0}) {
+        const auto gray = [start](double x, double y) {
+            const double rings = (std::hypot(x + 600, y - 150) - start) / 265;
+            return rings - std::floor(rings) < 0.7 ? 190.0 : 80.0;
+        };
+        const Segmentation result = segment_pixels(drawn({401, 301}, gray, 0.8, 5));
+        EXPECT_TRUE(std::ranges::any_of(result.notes, [](const std::string& note) {
+            return note.find("growth +x, by the rings' curvature") == 0;
+        })) << start;
+    }
+}
+
 // Strips much narrower than a ring, as a thin core shows them, along both axes.
 TEST(UnitDrawnRings, AStripNarrowerThanARing) {
     const auto gray = [](double x, double) { return x / 200 - std::floor(x / 200) < 0.7 ? 190.0 : 80.0; };
