@@ -49,10 +49,10 @@ Noise read_noise(const Entry& entry, const Curves& data, bool has_fields) {
             most = std::isnan(value) ? most : std::max(most, std::abs(value));
         }
         if (most > 0 && noise > most) {
-            found->fail("is more than any reading of the column: data that say nothing are left out");
+            found->fail("must not be more than the column's largest reading: leave out data that say nothing");
         }
         if (noise < last_digit * most) {
-            found->fail("is less than the last digit of the column's readings");
+            found->fail("must not be less than the last digit of the column's readings");
         }
         return std::optional(noise);
     };

@@ -540,7 +540,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     if (extension.meets_other_wood && !J.beside_changes && in_one_wood(body, materials, tip.position)) {
         const Mat2 H = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction).release();
         load.G = K.dot(H * K);
-    } else if (options.rotates && !press && load.G > 0.0) {
+    } else if (options.sizes_K_by_J && options.rotates && !press && load.G > 0.0) {
         // The interaction integral sees all of its domain in one frame. Where that has turned much from end to end, as in thin
         // arms, it tells the modes apart, and J how large they are.
         const Vec2 seen(load.K_I, load.K_II);

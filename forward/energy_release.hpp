@@ -36,6 +36,7 @@ struct EnergyReleaseOptions {
     double least_outer = 3.0;  // in other wood
     double least_outer_at_cracks = 2.0;
     bool rotates = false;
+    bool sizes_K_by_J = false;  // in finite rotation, of a state that is in balance
 };
 
 /// Energy release rate of one tip: the energy that the body gives up when a patch of the grid moves on with the tip while the
@@ -48,7 +49,7 @@ struct EnergyReleaseOptions {
 /// tip. K_I and K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left,
 /// seen toward the tip, ahead, and turns a crack clockwise. At small strain (K_I^2 + K_II^2) / E' = G is not imposed: both ways
 /// to G agree within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are
-/// near (`tips_test`). In finite rotation K has the size that G asks for.
+/// near (`tips_test`). In finite rotation K may be given the size that G asks for.
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 

@@ -588,7 +588,7 @@ double Equilibrium::power() const {
 
 TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& displacement, const MaterialMap& materials) const {
     EnergyReleaseOptions options;
-    options.rotates = plan_.rotates;
+    options.rotates = options.sizes_K_by_J = plan_.rotates;
     const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
     TipLoad load = tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, face_forces()}, options);
     if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);

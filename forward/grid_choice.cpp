@@ -18,8 +18,11 @@ namespace {
 
 constexpr double cells_of_coarsest = 16;  // across the smaller side
 constexpr double most_cells_tried = 128;
-constexpr double most_advances_a_cell =
-    2.0;  // of a grid tried; of the chosen one 1: over less the load goes in steps with the grid
+
+// Advances that a cell of the coarsest grid may span, as far as three grids have room for it. One of the chosen grid spans no
+// more than one: over less the load goes in steps with the grid.
+constexpr double most_advances_a_cell = 2.0;
+
 constexpr double most_cells_chosen = 512;
 constexpr int multiple = 4;      // of cells: places on lines of the grids tried lie on lines of the chosen one
 constexpr double safety = 1.25;  // Roache's, for three grids

@@ -39,9 +39,7 @@ double end_time(const Scene& scene) {
 
 bool may_end(const Scene& scene) {
     if (std::isfinite(end_time(scene))) return true;
-    const bool is_loaded = farthest_motion(scene, infinity) > 0.0 ||
-                           std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
-                           std::ranges::any_of(scene.bodies, [](const Body& body) { return !body.force.isZero(0.0); });
+    const bool is_loaded = farthest_motion(scene, infinity) > 0.0 || has_dead_load(scene);
     const auto measured = [&](const auto& driver) { return driver.name == scene.measure.displacement; };
     const bool follows =
         std::ranges::any_of(scene.edges, [&](const Edge& edge) { return measured(edge) && edge.traction; }) ||

@@ -16,16 +16,15 @@
 namespace crampfit {
 namespace {
 
-constexpr int terms = 14;                   // of the series, for each component
-constexpr int smooth_terms = 10;            // of a polynomial of third degree
-constexpr double unit = 100;                // length that r is counted in, so that the terms are of like size [px]
-constexpr int scan_points = 500;            // of the field that take part in the coarse search
-constexpr int scan_places = 13;             // along the longer side of the field
-constexpr int scan_angles = 16;             // around the circle
-constexpr std::size_t most_candidates = 6;  // of these that are looked at closely
-constexpr int ring_subsets = 6;             // outer radius of the ring about the tip, in subsets
-constexpr double inner_share = 2.0 / 3;     // of that, of the ring that tells how much the tip depends on it
-constexpr int least_points = 60;            // four times the series' coefficients
+constexpr int terms = 14;                // of the series, for each component
+constexpr int smooth_terms = 10;         // of a polynomial of third degree
+constexpr double unit = 100;             // length that r is counted in, so that the terms are of like size [px]
+constexpr int scan_points = 500;         // of the field that take part in the coarse search
+constexpr int scan_places = 13;          // along the longer side of the field
+constexpr int scan_angles = 16;          // around the circle
+constexpr int ring_subsets = 6;          // outer radius of the ring about the tip, in subsets
+constexpr double inner_share = 2.0 / 3;  // of that, of the ring that tells how much the tip depends on it
+constexpr int least_points = 60;         // four times the series' coefficients
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
@@ -41,8 +40,7 @@ constexpr double difference_step = 0.1;  // [px]
 constexpr double longest_step = 30;      // [px]
 constexpr double settled = 1e-3;         // [px]
 constexpr double most_damping = 1e8;
-constexpr double as_good = 1.1;        // a score by that factor above the best may be chance
-constexpr double clearly_less = 0.25;  // lines with another tip leave out other points
+constexpr double as_good = 1.1;  // a score by that factor above the best may be chance
 constexpr double widest_turn = 60.0 * std::numbers::pi / 180.0;
 
 using Term = Eigen::RowVector<double, terms>;
@@ -260,9 +258,8 @@ double end_error(const std::vector<Sample>& samples, const Line& line, int subse
     return 3.0 * subset;
 }
 
-/// The best few of a coarse grid of tips and directions, each better than those of the places beside it. Far from a wide crack's
-/// tip it may fit better at one than at the place next to the tip, which is half a spacing off.
-std::vector<Line> scan(const std::vector<Sample>& all, const PointLattice& lattice, int subset) {
+/// The best of a coarse grid of tips and directions.
+Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subset) {
     std::vector<Sample> samples;
     const std::size_t every = std::max<std::size_t>(1, all.size() / scan_points);
     for (std::size_t i = every / 2; i < all.size(); i += every) samples.push_back(all[i]);
@@ -273,39 +270,19 @@ std::vector<Line> scan(const std::vector<Sample>& all, const PointLattice& latti
 
     const double across = lattice.step * (lattice.columns - 1), down = lattice.step * (lattice.rows - 1);
     const double spacing = std::max({across, down, 1.0}) / scan_places;
-    struct Place {
-        Line line;
-        double score = std::numeric_limits<double>::infinity();
-    };
-    std::vector<Place> places;
-    int columns = 0;
-    for (double y = spacing / 2; y < down; y += spacing) {
-        columns = 0;
-        for (double x = spacing / 2; x < across; x += spacing, ++columns) {
-            Place place{{{lattice.first_x + x, lattice.first_y + y}, 0}};
+    Line best{{0, 0}, 0};
+    double least = std::numeric_limits<double>::infinity();
+    for (double y = spacing / 2; y < down; y += spacing)
+        for (double x = spacing / 2; x < across; x += spacing)
             for (int turn = 0; turn < scan_angles; ++turn) {
-                const Line line{place.line.tip, 2 * std::numbers::pi * turn / scan_angles};
+                const Line line{{lattice.first_x + x, lattice.first_y + y}, 2 * std::numbers::pi * turn / scan_angles};
                 const double width = clearance(subset, line.angle);
-                if (const double score = scan_score(samples, line, width, width); score < place.score) place = {line, score};
+                if (const double score = scan_score(samples, line, width, width); score < least) {
+                    least = score;
+                    best = line;
+                }
             }
-            places.push_back(place);
-        }
-    }
-    std::vector<Place> best;
-    for (int k = 0; k < static_cast<int>(places.size()); ++k) {
-        bool is_least = true;
-        for (int j = 0; j < static_cast<int>(places.size()); ++j) {
-            const bool is_beside = std::abs(j / columns - k / columns) <= 1 && std::abs(j % columns - k % columns) <= 1;
-            is_least = is_least && (j == k || !is_beside || places[j].score > places[k].score);
-        }
-        if (is_least) best.push_back(places[k]);
-    }
-    std::ranges::sort(best, {}, &Place::score);
-    std::vector<Line> lines;
-    for (const Place& place : best)
-        if (lines.size() < most_candidates) lines.push_back(place.line);
-    if (lines.empty()) lines.push_back({{lattice.first_x, lattice.first_y}, 0});
-    return lines;
+    return best;
 }
 
 /// Turns the line to where the points beside it agree best. The series as a whole is the same for any direction, but a
@@ -418,37 +395,20 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     found.status = TipStatus::too_few_points;
     if (static_cast<int>(samples.size()) < 2 * least_points) return found;
 
+    Line line = scan(samples, lattice, geometry.subset);
     Eigen::Matrix2d covariance;
     // The points that take part depend on the line, and the line on them: a few rounds, first over all, then over the
     // ring.
     constexpr double everywhere = std::numeric_limits<double>::infinity();
     const double ring = ring_subsets * geometry.subset;
     constexpr double degree = std::numbers::pi / 180;
-    const auto approach = [&](Line& line, double radius, double range) {
-        turn(within(samples, line.tip, radius), line, geometry.subset, range, std::isfinite(radius) ? widest_turn : range);
+    for (const auto& [radius, range] :
+         {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
+        turn(within(samples, line.tip, radius), line, geometry.subset, range, radius == ring ? widest_turn : range);
         const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, geometry.subset);
-        if (static_cast<int>(clear.size()) < least_points) return std::numeric_limits<double>::infinity();
+        if (static_cast<int>(clear.size()) < least_points) return found;
         covariance = refine(clear, line);
-        return residuals(clear, line).squaredNorm() / static_cast<double>(clear.size());
-    };
-    const auto is_in_picture = [&](const Vec2& x) {
-        return x.minCoeff() >= 0 && x.x() <= geometry.columns - 1 && x.y() <= geometry.rows - 1;
-    };
-    Line line{};
-    double least = std::numeric_limits<double>::infinity();
-    for (Line candidate : scan(samples, lattice, geometry.subset)) {
-        double left = 0;
-        for (const double range : {12 * degree, 6 * degree})
-            if (std::isfinite(left)) left = approach(candidate, everywhere, range);
-        const bool is_first = !std::isfinite(least);
-        if (left < (is_first ? least : clearly_less * least) && (is_first || is_in_picture(candidate.tip))) {
-            least = left;
-            line = candidate;
-        }
     }
-    if (!std::isfinite(least)) return found;
-    for (const double range : {3 * degree, 2 * degree})
-        if (!std::isfinite(approach(line, ring, range))) return found;
     // Torn subsets without a motion apart are shadows, dust and the like.
     if (!(gain(clear_of(samples, line, geometry.subset), line) > least_gain)) {
         found.status = TipStatus::no_crack;
@@ -468,13 +428,15 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         }
         line = *torn_line;
     }
+    const bool inside =
+        line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 && line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
     if (static_cast<int>(clear.size()) < least_points) return found;
     if (!(gain(clear, line) > least_gain)) {
         found.status = TipStatus::no_crack;
         return found;
     }
-    if (!is_in_picture(line.tip)) {
+    if (!inside) {
         found.status = TipStatus::outside;
         return found;
     }

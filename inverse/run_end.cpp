@@ -240,9 +240,10 @@ void check_machine(const Study& study, std::size_t experiment, const Range& comp
         }
     }
     if (most > 0 && farthest(data.displacement[peak], most, compliance, force_offset, offset) <= 0) {
-        throw InputError(study.file.string(), fmt::format("experiments.{}.compliance", experiment),
-                         fmt::format("{:g} mm/N", 1e3 * compliance.low),
-                         fmt::format("under the highest force, {:g} N at {:g} mm, the machine alone would give way by {:g} mm",
+        throw InputError(study.file.string(), fmt::format("experiments.{}.compliance", study.experiments[experiment].name),
+                         fmt::format("{:g} mm/N and more", 1e3 * compliance.low),
+                         fmt::format("must leave the specimen some of the displacement: under the highest force, {:g} N at {:g} "
+                                     "mm, the machine alone would give way by {:g} mm",
                                      most, 1e3 * data.displacement[peak], 1e3 * compliance.low * most));
     }
 }
@@ -254,6 +255,10 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     check_growth(test);
     check_rate(study, experiment);
     const Curves& data = test.data;
+    const Range compliance = range_of(study, experiment, &Machine::compliance);
+    const Range force_offset = range_of(study, experiment, &Machine::force_offset);
+    const Range offset = range_of(study, experiment, &Machine::displacement_offset);
+    check_machine(study, experiment, compliance, force_offset, offset);
     const bool by_time = !is_measured(data.displacement);
     const std::vector<double>& abscissa = by_time ? data.time : data.displacement;
     const RunEnd end = end_of_runs(test.scene, by_time);
@@ -268,10 +273,6 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     if (end.at == unbounded) {
         return with_crack_cut();
     }
-    const Range compliance = range_of(study, experiment, &Machine::compliance);
-    const Range force_offset = range_of(study, experiment, &Machine::force_offset);
-    const Range offset = range_of(study, experiment, &Machine::displacement_offset);
-    check_machine(study, experiment, compliance, force_offset, offset);
     double first = unbounded, last = -unbounded, beyond = unbounded;  // of the rows, and of those that no run need come to
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (std::isnan(abscissa[i])) {

@@ -225,6 +225,18 @@ TEST(UnitStudy, PhotographOfACrack) {
     refused(R"({ track = "track.h5" })", ".track", "size of the pictures");
 }
 
+TEST(UnitStudy, ACrackFitsIntoItsSpecimen) {
+    const StudyFolder folder;
+    for (const char* length : {"-0.4", "1000"}) {
+        const auto data = folder.write("wedge_1.csv", fmt::format("displacement [mm],force [N],crack_length [mm]\n0,0,1\n"
+                                                                  "0.1,5,{}\n",
+                                                                  length));
+        expect_error(data.string(), "crack_length, reading 2", "must lie between 0 and", [&] { folder.read(good_study); });
+    }
+    folder.write("wedge_1.csv", "displacement [mm],force [N],crack_length [mm]\n0,0,-0.2\n0.1,5,1\n");  // noise, 2 sigma
+    EXPECT_NO_THROW(folder.read(good_study));
+}
+
 TEST(UnitStudy, WhatIsWrongIsSaid) {
     const StudyFolder folder;
     struct Bad {
@@ -246,7 +258,10 @@ TEST(UnitStudy, WhatIsWrongIsSaid) {
         {"\"200 mN\"", "0.2", "experiments.wedge 1.noise.force", "missing unit"},
         {"\"200 mN\"", "\"0 N\"", "experiments.wedge 1.noise.force", "greater than 0"},
         {"noise = { force = \"200 mN\"", "noise = { time = \"1 s\"", "experiments.wedge 1.noise.time", "no such column"},
+        {"\"200 mN\"", "\"1e300 N\"", "experiments.wedge 1.noise.force", "largest reading"},
+        {"\"200 mN\"", "\"1e-300 N\"", "experiments.wedge 1.noise.force", "last digit"},
         {"weight = 2.0", "weight = 0", "experiments.wedge 1.weight", "greater than 0"},
+        {"weight = 2.0", "weight = 1e300", "experiments.wedge 1.weight", "from 1e-9 to 1e9"},
         {"scene = \"plain.toml\"", "name = \"wedge 1\"\nscene = \"plain.toml\"", "experiments.wedge 1", "is taken"},
         {"key = \"materials.EW.toughness\"", "", "parameters.EW toughness", "give one of key and keys"},
         {"key = \"materials.EW.toughness\"", "key = \"materials.EW.tougness\"", "parameters.EW toughness.key",

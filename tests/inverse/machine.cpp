@@ -1,7 +1,9 @@
 // A test seen through the machine that it was made on.
 #include "inverse/machine.hpp"
+#include "datasets/error.hpp"
 #include "inverse/curve.hpp"
 #include "inverse/fit.hpp"
+#include "inverse/run_end.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -106,6 +108,20 @@ TEST(SystemMachine, FoundBesideToughnessWithoutFurtherRuns) {
     std::printf("%zu evaluations, %d runs of the scene\n", fit.runs.size(), calls);
     EXPECT_LT(calls,
               0.6 * static_cast<double>(fit.runs.size()));  // of 1 + 2 x 5 points of a difference stencil 5 change a toughness
+}
+
+TEST(UnitMachine, AComplianceLeavesTheSpecimenSomeOfTheDisplacement) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.experiments[0].scene.stop = {};
+    study.experiments[0].scene.stop.crack_length = 1.0;
+    const double stiffness = wedge.stiffness(wedge.first_length);
+    study.experiments[0].machine.compliance = 0.2 / stiffness;
+    EXPECT_NO_THROW(covered_data(study, 0));
+    study.experiments[0].machine.compliance = 20 / stiffness;
+    EXPECT_THROW(covered_data(study, 0), InputError);
+    study.parameters.push_back(of_machine("experiments.wedge.compliance", 0, 30 / stiffness));  // it may be less
+    EXPECT_NO_THROW(covered_data(study, 0));
 }
 
 TEST(SystemMachine, FixedValuesMoveTheModelToo) {
