@@ -144,6 +144,7 @@ void SlidingBody::find_holds() {
 
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
     search_ = SearchInterval(most_steps_between_searches);
+    in_steps_ = true;
     const Points& points = body_.points;
     const int nodes = body_.layout.nodes_per_cell();
     // What a facet adds to the stiffness of a node, at most: its row of the facet's tangent, signs aside.
@@ -212,8 +213,8 @@ Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) c
     const bool is_kept = kept != grips_.end() && kept->place == touch.facet;
     const Vec2& before = place_[touch.facet];
     const double depth_before = is_kept ? 0.0 : std::min(0.0, signed_depth(shape_, before));
-    return drag({touch.normal, touch.curvature, touch.force, touch.stiffness, depth, depth_before, place - before}, friction_,
-                stiffness_[touch.facet], is_kept ? *kept : Grip{});
+    return drag({touch.normal, touch.curvature, touch.force, touch.stiffness, depth, depth_before, place - before, in_steps_},
+                friction_, stiffness_[touch.facet], is_kept ? *kept : Grip{});
 }
 
 // What friction takes on facets that touched and have come off since: their springs' energy, and their slip until then under a
@@ -230,7 +231,8 @@ double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displa
         double depth = 0.0, curvature = 0.0;
         Vec2 normal = Vec2::Zero();
         if (!depth_in(shape_, place_[grip.place], depth, normal, curvature)) continue;
-        const double touched = depth / (depth - std::min(0.0, signed_depth(shape_, place)));  // share of the way
+        // Share of the way.
+        const double touched = in_steps_ ? 1.0 : depth / (depth - std::min(0.0, signed_depth(shape_, place)));
         energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(normal));
     }
     return energy;

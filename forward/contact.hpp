@@ -112,6 +112,7 @@ class SlidingBody {
     std::vector<Grip> grips_;    // of the facets that touched then, by facet
     std::vector<Touch> pushed_;  // the last push
     double dissipated_ = 0.0;    // until then [J]
+    bool in_steps_ = false;      // in motion: forces work over whole time steps
     double sliding_now_ = 0.0;   // by the last push since then [J]
 };
 

@@ -21,8 +21,9 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     : scene_(scene), plan_(plan), materials_(materials), body_(body), cracks_(scene, body, materials, least_freed),
       boundary_(scene, body, cracks_),
       history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
-      internal_force_(body, materials, plan.rotates, history_.get()), team_(threads),
-      ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body) {
+      internal_force_(body, materials, plan.rotates, history_.get(), true), team_(threads),
+      ties_(body.layout.cell, body.layout.thickness, plan.added_frequency_squared), mapping_(scene.solver, body),
+      fine_tip_(scene, plan, materials, body, no_numbers_) {
     const std::size_t fields = cracks_.fields();
     displacement_.assign(fields, Vec2::Zero());
     velocity_.assign(fields, Vec2::Zero());
@@ -134,6 +135,7 @@ void ExplicitSolver::carry_velocities() {
 // Without force: velocities that the points hand back may close faces again, though the points themselves do not.
 void ExplicitSolver::close_crack_faces(bool with_force) {
     const double dt = plan_.time_step;
+    const double drag = with_force ? 0.5 * dt * scene_.solver.damping : 0.0;
     // Where points carry what the nodes have been given, they tell what the change took; forces' work has been counted without
     // it.
     const bool by_points = with_force && mapping_.nodes_carry() && !cracks_.pairs.empty();
@@ -161,9 +163,12 @@ void ExplicitSolver::close_crack_faces(bool with_force) {
         }
         const Vec2 gained = dt * (acceleration_[pair.left] - acceleration_[pair.right]);  // by the other forces
         const Vec2 twice_mean = by_points ? -gained : Vec2(2.0 * rate - gained + change);
-        books_.damped -= 0.5 * m_left * m_right / total * change.dot(twice_mean);
-        if (!by_points) struck_ += 0.25 * m_left * m_right / total * change.dot(gained + change);
-        face_force_[k] = m_left * m_right / total / dt * change;
+        const double mass = m_left * m_right / total;
+        books_.damped -= 0.5 * mass * change.dot(twice_mean);
+        // Against drag it takes more, and drag itself is that of the motion that comes about.
+        books_.damped += 0.5 * drag * mass * change.dot(2.0 * rate - gained);
+        if (!by_points) struck_ += 0.25 * mass * change.dot(gained + change);
+        face_force_[k] = (1.0 + drag) * mass / dt * change;
         velocity_[pair.left] += m_right / total * change;
         velocity_[pair.right] -= m_left / total * change;
         if (!with_force) continue;

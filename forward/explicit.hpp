@@ -4,6 +4,7 @@
 #include "forward/bridging.hpp"
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
+#include "forward/fine_tip.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/part_contact.hpp"
 #include "forward/plan.hpp"
@@ -77,6 +78,8 @@ class ExplicitSolver {
         Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
         std::unique_ptr<TipPatch> patch;                               // as of some time ago
         double since_patch = 0;                                        // how far it has gone since that was made [m]
+        double finer_at = 0;                                           // part of what it must that it gave up, by the patch, when
+                                                                       // finer cells were asked last
         Vec2 patch_direction = Vec2::Zero();                           // then
         double noted_at = 0;                                           // [s]
     };
@@ -100,6 +103,7 @@ class ExplicitSolver {
     void grow(int crack, bool at_end);
     TipPatch& patch_of(int crack, bool at_end);
     double toughness_to_overcome(int crack, bool at_end, double here);
+    FineTip::Ahead finer_ahead(int crack, bool at_end, const TipPatch& patch, double gone);
     void note_speed(Tip& state, double way);
 
     const Scene& scene_;
@@ -127,11 +131,14 @@ class ExplicitSolver {
     std::vector<Vec2> acceleration_;       // [m/s^2]
     std::vector<Vec2> force_;              // [N]
 
-    std::vector<Vec2> reaction_;    // [edges, then bodies] [N]
-    std::vector<Vec2> face_force_;  // [pairs] what pressed crack faces put on the left one in the last step [N]
-    std::vector<double> damped_;    // [pieces of the fields] in this step [J]
-    std::vector<Tip> tips_;         // two a crack: start, end
-    double fastest_crack_ = 0;      // [m/s]
+    std::vector<Vec2> reaction_;                // [edges, then bodies] [N]
+    std::vector<Vec2> face_force_;              // [pairs] what pressed crack faces put on the left one in the last step [N]
+    std::vector<double> damped_;                // [pieces of the fields] in this step [J]
+    std::vector<Tip> tips_;                     // two a crack: start, end
+    std::optional<InternalForce> patch_force_;  // of the wood at rest that patches are
+    const std::vector<MaterialSlope> no_numbers_;
+    FineTip fine_tip_;
+    double fastest_crack_ = 0;  // [m/s]
     double time_ = 0.0;
     EnergyBooks books_;
     EnergyBooks half_a_step_ago_;  // books before the forces of the last step but the tractions'

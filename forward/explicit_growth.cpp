@@ -31,6 +31,10 @@ constexpr double sharp_turn_cosine = 0.97;
 // credit.
 constexpr double most_repaid = 0.1;
 
+// Finer cells are asked once what a tip gives up is this part of what it must, and again when that part has become so much
+// larger.
+constexpr double least_load_for_finer = 0.5, most_rise_for_finer = 1.3;
+
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
 
@@ -93,8 +97,12 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
         ties_.take_in(cracks_, mass_, displacement_, false);
     } else {
-        const double softness =
-            materials_.homogeneous() ? 1.0 : patch_of(crack, at_end).softness(state.since_patch, displacement_);
+        double softness = 1.0;
+        if (!materials_.homogeneous()) {
+            const TipPatch& patch = patch_of(crack, at_end);
+            softness =
+                patch.softness(patch.gone(ties_.of_tip(cracks_, crack, at_end), state.since_patch - way) + way, displacement_);
+        }
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
     given -= energy();
@@ -110,8 +118,9 @@ TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
     Tip& state = tips_[2 * crack + at_end];
     if (!state.patch || state.since_patch > cell || state.patch_direction.dot(tip.direction) < most_turn_cosine) {
         const double advance = std::max(cell, scene_.cracks[crack].advance);
-        state.patch = std::make_unique<TipPatch>(body_, cracks_, boundary_, crack, at_end, advance, cell);
-        state.since_patch = 0.0;
+        if (!patch_force_) patch_force_.emplace(body_, materials_, false);
+        state.patch = std::make_unique<TipPatch>(body_, *patch_force_, cracks_, boundary_, crack, at_end, advance, cell);
+        state.since_patch = state.finer_at = 0.0;
         state.patch_direction = tip.direction;
     }
     return *state.patch;
@@ -122,11 +131,31 @@ double ExplicitSolver::toughness_to_overcome(int crack, bool at_end, double here
     const double advance = scene_.cracks[crack].advance;
     if (advance <= body_.layout.cell.maxCoeff()) return here;
     const CrackTip& tip = cracks_.lines[crack].tip(at_end);
-    const auto [now, mean] =
-        patch_of(crack, at_end)
-            .rates(tips_[2 * crack + at_end].since_patch, displacement_, ties_.softness(cracks_, crack, at_end));
-    const double share = mean > 0.0 ? now / mean : 1.0;
-    return mean_toughness(materials_, {tip.position, tip.position + advance * tip.direction}) * share;
+    Tip& state = tips_[2 * crack + at_end];
+    TipPatch& patch = patch_of(crack, at_end);
+    const std::vector<TipPatch::Tie> ties = ties_.of_tip(cracks_, crack, at_end);
+    const double gone = patch.gone(ties, state.since_patch);
+    const auto [now, mean] = patch.rates(gone, displacement_, ties);
+    const double toughness = mean_toughness(materials_, {tip.position, tip.position + advance * tip.direction});
+    if (!(mean > 0.0)) return toughness;
+    const double load = mean / (toughness * body_.layout.thickness);
+    if (load > least_load_for_finer && load > most_rise_for_finer * state.finer_at) {
+        patch.take_in(finer_ahead(crack, at_end, patch, gone), gone, displacement_, ties);
+        state.finer_at = load;
+    }
+    return toughness * now / (mean * patch.finer_share(gone));
+}
+
+// Nothing where bodies have come near, nor where wood remembers or fibres hold the faces: patches know of neither.
+FineTip::Ahead ExplicitSolver::finer_ahead(int crack, bool at_end, const TipPatch& patch, double gone) {
+    if (plan_.remembers || bridges_ || body_.layout.degree > 1) return {};
+    const Vec2 tip = cracks_.lines[crack].tip(at_end).position, reach = Vec2::Constant(patch.reach());
+    for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+        const Box at = bounds(scene_.bodies[b].shape);
+        const Vec2 moved_by = moved(boundary_.first_body() + static_cast<int>(b));
+        if (Box{tip - reach, tip + reach}.touches({at.low + moved_by, at.high + moved_by})) return {};
+    }
+    return fine_tip_.ahead(cracks_, crack, at_end, displacement_, patch.ways_from(gone), patch.reach());
 }
 
 void ExplicitSolver::note_speed(Tip& state, double way) {

@@ -155,13 +155,21 @@ bool is_pressed(const Scene& scene, const Discretisation& body, const Box& box, 
     return false;
 }
 
-// Whether faces of a crack touch in a box: what is cut out is solved as linear.
-bool touches_itself(const Discretisation& body, const Box& box, const Equilibrium& equilibrium, int crack) {
-    const std::vector<Vec2>& u = equilibrium.displacements();
-    return std::ranges::any_of(equilibrium.cracks().pairs, [&](const FieldPair& pair) {
-        return pair.crack == crack && pair.freed >= 1.0 && box.contains(body.layout.node_position(pair.node)) &&
-               (u[pair.left] - u[pair.right]).dot(pair.normal) < 0.0;
-    });
+// Whether a crack stands open behind its tip, and its faces touch nowhere in a box of the specimen: what is cut out is solved as
+// linear.
+bool is_open(const GridView& grid, bool at_end, const Box& box) {
+    const CrackLine& line = grid.cracks.lines[grid.crack];
+    const double opening = opening_behind(grid.cracks, grid.crack, at_end, grid.body.layout.cell.maxCoeff(), grid.displacement)
+                               .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
+    return opening > 0.0 && std::ranges::none_of(grid.cracks.pairs, [&](const FieldPair& pair) {
+               return pair.crack == grid.crack && pair.freed >= 1.0 &&
+                      box.contains(grid.origin + grid.body.layout.node_position(pair.node)) &&
+                      (grid.displacement[pair.left] - grid.displacement[pair.right]).dot(pair.normal) < 0.0;
+           });
+}
+
+GridView view_of(const Discretisation& body, const Equilibrium& equilibrium, int crack) {
+    return {body, equilibrium.cracks(), equilibrium.displacements(), Vec2::Zero(), crack};
 }
 
 template <class Visit>
@@ -179,6 +187,16 @@ Mat2 mean_gradient(const Discretisation& body, const Box& box, const std::vector
         ++points;
     });
     return sum / points;
+}
+
+// The turn of a box as a whole, taken off the displacements: what is left is small.
+Mat2 take_off_turn(const Mat2& gradient, const Layout& layout, const CrackFields& cracks, std::vector<Vec2>& displacement) {
+    const Mat2 turn = Polar(gradient).turn;
+    for (std::size_t f = 0; f < displacement.size(); ++f) {
+        const Vec2 x = layout.node_position(cracks.node_of_field[f]);
+        displacement[f] = turn.transpose() * (x + displacement[f]) - x;
+    }
+    return turn;
 }
 
 // Adds the slope by the displacements of something whose slope by the turn of the box's mean gradient is `moment`.
@@ -290,14 +308,9 @@ FineTip::Woods FineTip::make_woods(std::span<const TipBoxes* const> places) cons
 
 // Whether the grid misses something there.
 bool FineTip::counts(const TipPlace& place, const Equilibrium& equilibrium) const {
-    const auto& [about, crack, at_end] = place;
-    const CrackFields& cracks = equilibrium.cracks();
-    const CrackLine& line = cracks.lines[crack];
-    const double opening = opening_behind(cracks, crack, at_end, body_.layout.cell.maxCoeff(), equilibrium.displacements())
-                               .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    const Box& outermost = about.boxes[0];
-    return opening > 0.0 && stands_alone(scene_, body_.layout, cracks, crack, outermost, {}) &&
-           !touches_itself(body_, outermost, equilibrium, crack) &&
+    const Box& outermost = place.boxes.boxes[0];
+    return is_open(view_of(body_, equilibrium, place.crack), place.at_end, outermost) &&
+           stands_alone(scene_, body_.layout, equilibrium.cracks(), place.crack, outermost, {}) &&
            !is_pressed(scene_, body_, outermost, equilibrium, small_.free_bodies);
 }
 
@@ -340,6 +353,65 @@ std::vector<MissedEnergy> FineTip::missed(const std::vector<TipPlace>& places, c
     return found;
 }
 
+FineTip::Ahead FineTip::ahead(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement,
+                              const std::vector<double>& ways, double reach) {
+    CrackLine line = cracks.lines[crack];
+    CrackTip& tip = line.tip(at_end);
+    const Vec2 start = tip.position;
+    const auto boxes = about(cracks, {crack, start, start + ways.back() * tip.direction});
+    if (!boxes) return {};
+    const Vec2& cell = body_.layout.cell;
+    const Box within{Vec2::Zero(), body_.layout.size()}, &outermost = boxes->boxes[0];
+    Box around = box_around({start, start}, reach / cell.maxCoeff(), pitches[0], cell, within);
+    around = {around.low.cwiseMin((outermost.low - cell).cwiseMax(within.low)),
+              around.high.cwiseMax((outermost.high + cell).cwiseMin(within.high))};
+    if (!stands_alone(scene_, body_.layout, cracks, crack, around, {})) return {};
+    std::vector<Vec2> turned_back = displacement;
+    if (rotates_) take_off_turn(mean_gradient(body_, around, displacement), body_.layout, cracks, turned_back);
+
+    CutOut at_rest(scene_, small_, numbers_, std::make_shared<CutOutWood>(scene_, materials_, around, cell));
+    Ahead found{boxes->share, {}};
+    TipBoxes all_of_it = *boxes;
+    all_of_it.share = 1.0;
+    const TipPlace place{all_of_it, crack, at_end};
+    for (const double way : ways) {
+        tip.position = start + way * tip.direction;
+        if (found.potential.size() == 1) line.points.insert(at_end ? line.points.end() : line.points.begin(), tip.position);
+        (at_end ? line.points.back() : line.points.front()) = tip.position;
+        if (!at_rest.solve(line, crack, at_end, {body_, cracks, turned_back, Vec2::Zero(), crack}, false)) return {};
+        if (!is_open(at_rest.view(), at_end, outermost)) return {};
+        std::vector<GridView> views{at_rest.view()};
+        const auto missed = go_down(place, parts_of(place, line, {}), line, true, views);
+        if (!missed) return {};
+        found.potential.push_back(at_rest.potential() + *missed);
+    }
+    return found;
+}
+
+// What is missed in each of the boxes, which are seen from each other in `views` from the grid on; none where they do not all see
+// the crack alike. `at_rest`: the grid is in equilibrium.
+std::optional<double> FineTip::go_down(const TipPlace& tip, const Parts& parts, const CrackLine& line, bool at_rest,
+                                       std::vector<GridView>& views) const {
+    const auto& [place, crack, at_end] = tip;
+    const auto& [coarse, fine] = parts;
+    double missed = 0.0;
+    for (std::size_t k = 0; k < fine.size(); ++k) {
+        std::array<bool, 2> good{};
+        do_side_by_side(side_by_side_, 2, [&](std::size_t other) {
+            good[other] = other ? coarse[k]->solve(line, crack, at_end, views[k], at_rest || k > 0)
+                                : fine[k]->solve(line, crack, at_end, views[k], false);
+        });
+        if (!good[0] || !good[1]) return std::nullopt;
+        const double held = fine[k]->potential(), of = coarse[k]->potential();
+        const auto within = [&](double least, double most) { return held >= least * of && held <= most * of; };
+        if (!within(far_below_coarse, far_above_coarse)) return std::nullopt;
+        if (!within(least_of_coarse, most_of_coarse) && turns_sharply(line, place.boxes[k])) return std::nullopt;
+        missed += place.share * (held - of);
+        views.push_back(fine[k]->view());
+    }
+    return missed;
+}
+
 MissedEnergy FineTip::missed(const TipPlace& tip, const Parts& parts, const Equilibrium& equilibrium, bool with_slopes) const {
     const auto& [place, crack, at_end] = tip;
     const CrackFields& cracks = equilibrium.cracks();
@@ -349,35 +421,18 @@ MissedEnergy FineTip::missed(const TipPlace& tip, const Parts& parts, const Equi
     std::vector<Vec2> displacement = equilibrium.displacements();
     if (rotates_) {
         gradient = mean_gradient(body_, place.boxes[0], displacement);
-        turn = Polar(gradient).turn;
-        for (std::size_t f = 0; f < displacement.size(); ++f) {
-            const Vec2 x = body_.layout.node_position(cracks.node_of_field[f]);
-            displacement[f] = turn.transpose() * (x + displacement[f]) - x;
-        }
+        turn = take_off_turn(gradient, body_.layout, cracks, displacement);
     }
 
-    // Down.
-    const auto& [coarse, fine] = parts;
     std::vector<GridView> views{{body_, cracks, displacement, Vec2::Zero(), crack}};
-    MissedEnergy missed;
-    for (std::size_t k = 0; k < fine.size(); ++k) {
-        std::array<bool, 2> good{};
-        do_side_by_side(side_by_side_, 2, [&](std::size_t other) {
-            // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
-            good[other] = other ? coarse[k]->solve(line, crack, at_end, views[k], !rotates_ || k > 0)
-                                : fine[k]->solve(line, crack, at_end, views[k], false);
-        });
-        if (!good[0] || !good[1]) return {};
-        const double held = fine[k]->potential(), of = coarse[k]->potential();
-        const auto within = [&](double least, double most) { return held >= least * of && held <= most * of; };
-        if (!within(far_below_coarse, far_above_coarse)) return {};
-        if (!within(least_of_coarse, most_of_coarse) && turns_sharply(line, place.boxes[k])) return {};
-        missed.energy += place.share * (held - of);
-        views.push_back(fine[k]->view());
-    }
+    // Without the turn of its tip the wood of a scene that rotates is not quite in equilibrium.
+    const auto energy = go_down(tip, parts, line, !rotates_, views);
+    if (!energy) return {};
+    MissedEnergy missed{*energy, {}, {}};
     if (!with_slopes) return missed;
 
     // And up: the slopes.
+    const auto& [coarse, fine] = parts;
     missed.by_number.assign(numbers_.size(), 0.0);
     std::vector<Vec2> slope;  // of the innermost nothing is cut out
     for (std::size_t k = fine.size(); k-- > 0;) {

@@ -63,6 +63,17 @@ class FineTip {
     /// has come into the boxes. With its slopes by the numbers, or without. Places that share no box may be solved side by side.
     std::vector<MissedEnergy> missed(const std::vector<TipPlace>& places, const Equilibrium& equilibrium, bool with_slopes);
 
+    struct Ahead {
+        double share = 0;               // that counts, as of what is missed
+        std::vector<double> potential;  // [J]
+    };
+
+    /// Around a tip of a specimen in motion: the potential of the wood within `reach` of it [m], brought to rest with its outline
+    /// held where it is and seen with finer cells at the tip, with that so far straight on as each of the rising `ways` says,
+    /// from nil on [m]. None where `about` has no boxes or something else acts in that wood, nor where the crack is closed.
+    Ahead ahead(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement,
+                const std::vector<double>& ways, double reach);
+
   private:
     struct Parts {
         std::vector<std::shared_ptr<CutOut>> coarse, fine;  // [boxes]
@@ -74,6 +85,8 @@ class FineTip {
     bool counts(const TipPlace& place, const Equilibrium& equilibrium) const;
     Parts parts_of(const TipPlace& place, const CrackLine& line, const Woods& made);
     MissedEnergy missed(const TipPlace& tip, const Parts& parts, const Equilibrium& equilibrium, bool with_slopes) const;
+    std::optional<double> go_down(const TipPlace& tip, const Parts& parts, const CrackLine& line, bool at_rest,
+                                  std::vector<GridView>& views) const;
 
     const Scene& scene_;
     const MaterialMap& materials_;

@@ -48,7 +48,8 @@ Drag drag(const Pressing& pressing, double coefficient, double stiffness, const 
     result.energy = 0.5 * stiffness * result.stretch * result.stretch;
     // The work of the force, as it goes evenly from then to now, less what the spring takes: 1/2 k (e_before + e) (e - e_before +
     // slid).
-    result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * slid;
+    const double counted = pressing.in_steps ? slid + (1.0 - share) * along : slid;
+    result.dissipated = 0.5 * stiffness * (before.stretch + result.stretch) * counted;
     return result;
 }
 

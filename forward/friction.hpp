@@ -25,6 +25,7 @@ struct Pressing {
     double depth = 0.0;        // [m]
     double depth_before = 0;   // then; below 0: it did not touch [m]
     Vec2 gone = Vec2::Zero();  // of the place against what it touches, since then [m]
+    bool in_steps = false;     // forces work over whole time steps, also over one in which the place begins to touch
 };
 
 /// Coulomb friction at such a place: a spring along the surface that slips where its force reaches `coefficient` times the normal

@@ -10,7 +10,8 @@ namespace crampfit {
 namespace {
 
 // What is alone on its fields has second moments of so much of a cell's at least, times their volumes: a sliver in a corner
-// hardly moves with the node across, and would spoil the condition of the stiffness.
+// hardly moves with the node across, and would spoil the condition of the stiffness. In motion that much on a point that an
+// outline leaves little of would shorten the time step.
 constexpr double least_crosswise = 1e-3;
 
 Eigen::Matrix3d matrix_of(const std::array<double, 6>& C) {
@@ -19,8 +20,10 @@ Eigen::Matrix3d matrix_of(const std::array<double, 6>& C) {
 
 }  // namespace
 
-InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history)
-    : body_(body), rotates_(rotates), history_(history), uneven_(body, materials, rotates, history), strips_(body.layout) {
+InternalForce::InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history,
+                             bool in_motion)
+    : body_(body), rotates_(rotates), history_(history), least_crosswise_(in_motion ? 0.0 : least_crosswise),
+      uneven_(body, materials, rotates, history), strips_(body.layout) {
     sort_cells();
 }
 
@@ -89,7 +92,7 @@ void InternalForce::add_alone(int p) {
 
 void InternalForce::add_alone(int cell, std::span<const int> fields, double volume, const Vec2& moments) {
     const Vec2& size = body_.layout.cell;
-    const Vec2 least = least_crosswise * size.prod() * body_.layout.thickness / volume * size.cwiseAbs2();
+    const Vec2 least = least_crosswise_ * size.prod() * body_.layout.thickness / volume * size.cwiseAbs2();
     Alone alone{cell, {fields[0], fields[1], fields[2], fields[3]}, volume, moments.cwiseMax(least), 0.0};
     alone.stiffness = crosswise_stiffness(alone, body_.points.stiffness_of(body_.points.first_of_cell[cell]));
     alone_.push_back(alone);

@@ -35,8 +35,9 @@ namespace crampfit {
 /// Cells are taken in strips: the same bits for any number of threads.
 class InternalForce {
   public:
-    /// `history`: of the points that have one, null where none does.
-    InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history = nullptr);
+    /// `history`: of the points that have one, null where none does. `in_motion`: nothing is factored.
+    InternalForce(const Discretisation& body, const MaterialMap& materials, bool rotates, History* history = nullptr,
+                  bool in_motion = false);
 
     /// Call after points changed their fields.
     void sort_cells();
@@ -131,6 +132,7 @@ class InternalForce {
     const Discretisation& body_;
     bool rotates_;
     History* history_;
+    double least_crosswise_;
     std::vector<int> whole_cells_;
     std::vector<int> loose_points_;
     std::vector<Shortened> shortened_;

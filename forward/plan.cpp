@@ -402,9 +402,12 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                                 : "equilibrium, Newton's method",
                why);
     else choose("solver", "explicit dynamics", why);
-    double least_advance = std::numeric_limits<double>::infinity();
-    for (const Crack& crack : scene.cracks)
-        if (crack.grows != Growth::none) least_advance = std::min(least_advance, crack.advance);
+    double least_advance = std::numeric_limits<double>::infinity(), most_advance = 0.0;
+    for (const Crack& crack : scene.cracks) {
+        if (crack.grows == Growth::none) continue;
+        least_advance = std::min(least_advance, crack.advance);
+        most_advance = std::max(most_advance, crack.advance);
+    }
     const bool fine_enough = std::min(body.layout.cells_x, body.layout.cells_y) >= 2 * least_coarse_cells &&
                              least_advance >= 2.0 * body.layout.cell.maxCoeff() * (1.0 - 1e-6);
     const bool may_meet = plan.grows && scene.cracks.size() > 1;
@@ -429,8 +432,9 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
             "advance", "shorter than a cell",
             "what is released over less than a cell goes in steps with the grid: the load comes out too high; 0 takes G at the "
             "tip instead, or take finer cells");
-    if (plan.quasistatic && !materials.homogeneous() && !plan.remembers && plan.grows && std::isfinite(least_advance) &&
-        least_advance > 0.0)
+    const bool patches_see = body.layout.degree == 1 && !BridgedFaces::are_in(scene);
+    const bool asks_ahead = plan.quasistatic ? least_advance > 0.0 : patches_see && most_advance > body.layout.cell.maxCoeff();
+    if (plan.grows && asks_ahead && !materials.homogeneous() && !plan.remembers)
         choose("tips near sharp boundaries", "boxes with finer cells around them",
                "a tip that passes into wood many times as stiff releases hardly any energy within a cell: the grid alone takes "
                "it for much");

@@ -147,7 +147,6 @@ void Recorder::look() {
 }
 
 void Recorder::save_row() {
-    finite_ = solver_.is_finite();
     Instant row = now();
     save_forces();
     if (!record_.reactions.empty()) row.force = force_of(record_.series.size());
@@ -175,6 +174,7 @@ void Recorder::save_row() {
     row.fracture_energy = books.fracture;
     row.external_work = books.work;
     const double kept = books.strain + books.kinetic + books.contact + books.fracture + books.damped;
+    finite_ = solver_.is_finite() && std::isfinite(kept - books.work);
     largest_energy_ = std::max({largest_energy_, std::abs(books.work), kept});
     largest_imbalance_ = std::max(largest_imbalance_, std::abs(books.work - kept));
     if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;
@@ -226,6 +226,10 @@ void Recorder::finish(RunStatus status, std::string message) {
     record_.message = std::move(message);
     record_.steps = steps_;
     if (record_.series.back().time < solver_.time()) save_row();
+    if (!finite_) {
+        record_.status = RunStatus::unstable;
+        record_.message = "a displacement became infinite";
+    }
     for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.back() = since_last_row_[d];
     if (!record_.reactions.empty()) record_.series.back().force = force_of(record_.series.size() - 1);
     if (scene_.output.frames > 0 && record_.frames.back().time < solver_.time()) {

@@ -302,7 +302,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     for (long step = 0;; ++step) {
         recorder.look();
         if (!recorder.is_finite()) {
-            recorder.finish(RunStatus::unstable, "a displacement became infinite");
+            recorder.finish(RunStatus::unstable, {});
             break;
         }
         if (reached(scene.stop, recorder.now())) {

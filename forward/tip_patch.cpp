@@ -25,20 +25,29 @@ constexpr double least_stiffness = 1e-9;
 // A pair is never taken for stiffer, or softer, than by this.
 constexpr double least_softness = 0.05;
 
-// A rate is what a tip gives up over this part of a cell.
-constexpr double little = 0.02;
+// In so many parts of its slack finer cells are asked. What the grid misses goes up and down within a cell.
+constexpr std::size_t legs = 4;
 
-// Strain-displacement matrix of a point, xx, yy, 2 xy.
-Eigen::Matrix<double, 3, Eigen::Dynamic> strains(const CellWeights& w, int nodes) {
-    Eigen::Matrix<double, 3, Eigen::Dynamic> B(3, 2 * nodes);
+// What finer cells give up is never taken for less than this part of what the patch does.
+constexpr double least_share = 0.05;
+
+// A rate is what a tip gives up over this part of a cell, or up to where it begins to free the next pair: across a boundary that
+// may give up many times as much.
+constexpr double little = 0.02, least_way = 1e-3;
+
+// Of a point that sees B-splines, by its fields [N/m].
+Eigen::MatrixXd stiffness_of(const Discretisation& body, int p) {
+    const CellWeights& w = body.weights[body.points.slot[p]];
+    const int nodes = body.layout.nodes_per_cell();
+    Eigen::Matrix<double, 3, Eigen::Dynamic> B(3, 2 * nodes);  // strain xx, yy, 2 xy
     for (int k = 0; k < nodes; ++k) B.block<3, 2>(0, 2 * k) << w.slope_x[k], 0, 0, w.slope_y[k], w.slope_y[k], w.slope_x[k];
-    return B;
+    return body.points.volume[p] * B.transpose() * body.points.stiffness_of(p) * B;
 }
 
 }  // namespace
 
-TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end,
-                   double advance, double slack) {
+TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const CrackFields& cracks, const Boundary& boundary,
+                   int crack, bool at_end, double advance, double slack) {
     const CrackTip tip = cracks.lines[crack].tip(at_end);
     cell_ = way_past_a_node(tip.direction, body.layout.cell);
     // The crack as it will be, as far as that is wood.
@@ -47,12 +56,14 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
     if (const auto out = exit_distance(tip.position, tip.direction, {Vec2::Zero(), body.layout.size()}))
         way = std::min(way, *out - 1e-3 * h);
     advance_ = std::min(advance, way - slack);
+    slack_ = slack;
     if (advance_ <= 0.0) return;
     const auto points_before = body.points.node;
     CrackFields ahead = cracks;
     ahead.grow(crack, at_end, tip.position + way * tip.direction);
+    internal_force.sort_cells();
 
-    const double reach = std::max(advances_in_reach * advance, least_cells_in_reach * h);
+    reach_ = std::max(advances_in_reach * advance, least_cells_in_reach * h);
     const std::vector<double> mass = field_masses(body, ahead.fields());
     std::vector<std::size_t> passed;
     for (std::size_t k = 0; k < ahead.pairs.size(); ++k) {
@@ -61,18 +72,19 @@ TipPatch::TipPatch(Discretisation& body, const CrackFields& cracks, const Bounda
         if (pair.crack != crack || !std::isfinite(pair.compliance) || left == 0.0 || right == 0.0) continue;
         const Vec2 place = body.layout.node_position(pair.node);
         const double freed = share_freed(place, tip, body.layout);
-        const bool is_near = (place - tip.position).cwiseAbs().maxCoeff() < 0.5 * reach - h;  // a crack may come back on itself
+        const bool is_near = (place - tip.position).cwiseAbs().maxCoeff() < 0.5 * reach_ - h;  // a crack may come back on itself
         if (!is_near || freed >= 1.0 || freed + way / cell_ <= 0.0) continue;
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
-    for (const double half_width : {0.5 * reach, reach})
-        woods_.push_back(cut_out(body, ahead, cracks.fields(), boundary, tip.position, half_width, passed));
+    for (const double half_width : {0.5 * reach_, reach_})
+        woods_.push_back(cut_out(body, internal_force, ahead, cracks.fields(), boundary, tip.position, half_width, passed));
     body.points.node = points_before;
 }
 
-TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const CrackFields& ahead, int fields_now, const Boundary& boundary,
-                                 const Vec2& tip, double reach, const std::vector<std::size_t>& passed) const {
+TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const InternalForce& internal_force, const CrackFields& ahead,
+                                 int fields_now, const Boundary& boundary, const Vec2& tip, double reach,
+                                 const std::vector<std::size_t>& passed) const {
     // Whether fields belong to the patch, and whether to wood beyond it too.
     Wood wood{};
     const int fields = ahead.fields();
@@ -104,20 +116,31 @@ TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const CrackFields& 
     // Stiffness between the free, and between them and the held.
     std::vector<Eigen::Triplet<double>> inner, outer;
     double stiffest = 0.0;
-    for (const int c : cells) {
-        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
-            const auto B = strains(body.weights[body.points.slot[p]], body.layout.nodes_per_cell());
-            const Eigen::MatrixXd K = body.points.volume[p] * B.transpose() * body.points.stiffness_of(p) * B;
-            const auto dof = [&](int i) { return 2 * body.points.node[p][i / 2] + i % 2; };
-            for (int i = 0; i < K.rows(); ++i) {
-                const int row = equation[dof(i)];
-                if (row < 0) continue;
-                stiffest = std::max(stiffest, K(i, i));
-                for (int j = 0; j < K.cols(); ++j) {
-                    if (equation[dof(j)] >= 0) inner.emplace_back(row, equation[dof(j)], K(i, j));
-                    else outer.emplace_back(row, column[dof(j)], K(i, j));
-                }
+    const auto add = [&](std::span<const int> of, const Eigen::MatrixXd& K) {
+        const auto dof = [&](int i) { return 2 * of[i / 2] + i % 2; };
+        for (int i = 0; i < K.rows(); ++i) {
+            const int row = equation[dof(i)];
+            if (row < 0) continue;
+            stiffest = std::max(stiffest, K(i, i));
+            for (int j = 0; j < K.cols(); ++j) {
+                if (equation[dof(j)] >= 0) inner.emplace_back(row, equation[dof(j)], K(i, j));
+                else outer.emplace_back(row, column[dof(j)], K(i, j));
             }
+        }
+    };
+    const std::vector<Vec2> at_rest(fields, Vec2::Zero());
+    for (const int c : cells) {
+        for_groups(body.points, c, [&](const PointGroup& group) {
+            const auto of = body.points.node[group.first];
+            if (body.layout.degree == 1) add(of, internal_force.tangent(group.first, group.count, at_rest, false));
+            else
+                for (int p = group.first; p < group.first + group.count; ++p) add(of, stiffness_of(body, p));
+        });
+        for (const InternalForce::Alone& alone :
+             std::ranges::equal_range(internal_force.alone(), c, {}, &InternalForce::Alone::cell)) {
+            Eigen::Matrix<double, 2, 8> apart;
+            for (int k = 0; k < 4; ++k) apart.block<2, 2>(0, 2 * k) = crosswise_sign[k] * Mat2::Identity();
+            add(alone.node, alone.stiffness * apart.transpose() * apart);
         }
     }
     // The ties of all pairs but those on the way stay as they are.
@@ -196,6 +219,14 @@ double TipPatch::potential(const Wood& wood, double at, const std::vector<double
     return 0.5 * w.dot(C.ldlt().solve(w));
 }
 
+double TipPatch::gone(std::span<const Tie> ties, double by_way) const {
+    for (const Tie& tie : ties) {
+        const auto pair = std::ranges::find(pairs_, tie.node, &Pair::node);
+        if (pair != pairs_.end()) return (tie.freed - pair->freed) * cell_;
+    }
+    return by_way;
+}
+
 // How far the tip is from the next pair [m].
 double TipPatch::to_next_pair(double gone) const {
     double next = cell_;
@@ -204,6 +235,16 @@ double TipPatch::to_next_pair(double gone) const {
         if (until >= -0.05 * cell_) next = std::min(next, std::max(0.0, until));
     }
     return next;
+}
+
+// Over the next advance [J]. From where the tip is at a pair to where it is at the next one the potential goes linearly: so it
+// will when it is there.
+double TipPatch::given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const {
+    const double next = to_next_pair(gone), cells = (advance_ - next) / cell_, whole = std::floor(cells);
+    const double last = gone + next + whole * cell_;
+    const auto at = [&](double place) { return potential(wood, place, softness, jumps); };
+    const double before = at(last);
+    return at(gone) - std::lerp(before, at(last + cell_), cells - whole);
 }
 
 double TipPatch::beyond_outline(const std::function<double(const Wood&)>& of) const {
@@ -231,24 +272,54 @@ double TipPatch::softness(double gone, const std::vector<Vec2>& displacement) co
     return std::clamp(found, least_softness, 1.0 / least_softness);
 }
 
-TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displacement, std::span<const Softness> ties) const {
-    if (is_idle() || advance_ <= cell_) return {};
+std::vector<double> TipPatch::factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const {
     std::vector<double> factors(pairs_.size(), softness(gone, displacement));
     for (std::size_t k = 0; k < pairs_.size(); ++k)
-        for (const Softness& tie : ties)
-            if (tie.node == pairs_[k].node) factors[k] = tie.factor;
-    // From where the tip is at a pair to where it is at the next one the potential goes linearly: so it will when it is there.
-    const double next = to_next_pair(gone), cells = (advance_ - next) / cell_, whole = std::floor(cells);
-    const double last = gone + next + whole * cell_;
+        for (const Tie& tie : ties)
+            if (tie.node == pairs_[k].node) factors[k] = tie.softness;
+    return factors;
+}
+
+std::vector<double> TipPatch::ways_from(double gone) const {
+    const double left = std::max(slack_ - gone, 1e-3 * slack_);
+    std::vector<double> ways;
+    for (const double from : {0.0, advance_})
+        for (std::size_t k = 0; k <= legs; ++k) ways.push_back(from + left * static_cast<double>(k) / static_cast<double>(legs));
+    return ways;
+}
+
+void TipPatch::take_in(const FineTip::Ahead& ahead, double gone, const std::vector<Vec2>& displacement,
+                       std::span<const Tie> ties) {
+    known_ = {gone, {}};
+    if (ahead.potential.empty()) return;
+    const std::vector<double> factors = factors_of(gone, displacement, ties), ways = ways_from(gone);
+    const Wood& wood = woods_.back();
+    const Eigen::VectorXd jumps = wood.jumps_of(displacement);
+    for (std::size_t k = 0, end = legs + 1; k <= legs; ++k, ++end) {
+        const double finer = ahead.potential[k] - ahead.potential[end];
+        const double share = std::max(least_share, finer / given(wood, gone + ways[k], factors, jumps));
+        known_.finer_share.push_back(std::lerp(1.0, share, ahead.share));
+    }
+}
+
+double TipPatch::finer_share(double gone) const {
+    if (known_.finer_share.empty()) return 1.0;
+    const double place = std::clamp((gone - known_.from) / ways_from(known_.from)[1], 0.0, static_cast<double>(legs));
+    const auto k = std::min(static_cast<std::size_t>(place), legs - 1);
+    return std::lerp(known_.finer_share[k], known_.finer_share[k + 1], place - static_cast<double>(k));
+}
+
+TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const {
+    if (is_idle() || advance_ <= cell_) return {};
+    const std::vector<double> factors = factors_of(gone, displacement, ties);
+    const double next = to_next_pair(gone), on = next > least_way * cell_ ? std::min(next, little * cell_) : little * cell_;
     double now = 0.0;
     const double now_over_mean = beyond_outline([&](const Wood& wood) {
         const Eigen::VectorXd jumps = wood.jumps_of(displacement);
         const auto at = [&](double place) { return potential(wood, place, factors, jumps); };
-        const double here = at(gone), before = at(last);
-        const double end = before + (cells - whole) * (at(last + cell_) - before);
-        const double rate = (here - at(gone + little * cell_)) / (little * cell_);
+        const double rate = (at(gone) - at(gone + on)) / on;
         if (&wood == &woods_.back()) now = rate;
-        return rate * advance_ / (here - end);
+        return rate * advance_ / given(wood, gone, factors, jumps);
     });
     if (!(now_over_mean > 0.0)) return {};
     return {now, now / now_over_mean};

@@ -1,6 +1,8 @@
 #pragma once
 
 #include "forward/boundary.hpp"
+#include "forward/fine_tip.hpp"
+#include "forward/internal_force.hpp"
 
 #include <Eigen/Core>
 
@@ -25,28 +27,46 @@ namespace crampfit {
 /// without (Richardson 1911).
 class TipPatch {
   public:
-    /// Softness of the tie that holds the pair at a node (TipTies).
-    struct Softness {
+    /// What holds the pair at a node (TipTies).
+    struct Tie {
         int node;
-        double factor;
+        double softness;
+        double freed;  // of the pair
     };
 
-    /// Leaves `body` as it was. `slack` [m] is how far the tip may go on before this patch is no longer good.
-    TipPatch(Discretisation& body, const CrackFields& cracks, const Boundary& boundary, int crack, bool at_end, double advance,
-             double slack);
+    /// Leaves `body` as it was. `wood`: of small strain and without history, sorted for this patch alone. `slack` [m] is how far
+    /// the tip may go on before this patch is no longer good.
+    TipPatch(Discretisation& body, InternalForce& wood, const CrackFields& cracks, const Boundary& boundary, int crack,
+             bool at_end, double advance, double slack);
 
     struct Rates {
         double now = 0;   // what the ties give up now
         double mean = 0;  // over the next `advance`
     };
 
+    /// How far the tip has gone since the patch was made [m], by how much of the pairs that it is passing is free: one that has
+    /// turned a little since then passes them elsewhere. `by_way` where it passes none.
+    double gone(std::span<const Tie> ties, double by_way) const;
+
     /// Energy release rates [J/m], with the tip `gone` [m] beyond where it was when the patch was made and these ties at it. Nil
     /// where there is no load, or no more than the next cell is left.
-    Rates rates(double gone, const std::vector<Vec2>& displacement, std::span<const Softness> ties) const;
+    Rates rates(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
 
     /// What the compliances of the next pairs must be multiplied by for the potential to go linearly while the tip passes them;
     /// the formula of `FieldPair::compliance` does not know of boundaries in the wood.
     double softness(double gone, const std::vector<Vec2>& displacement) const;
+
+    /// How far the wide patch reaches from where the tip was [m].
+    double reach() const { return reach_; }
+
+    /// Ways of a tip that has `gone` so far already, at whose ends it hangs what finer cells give up [m].
+    std::vector<double> ways_from(double gone) const;
+
+    /// Takes in what these tell in these displacements (FineTip::ahead).
+    void take_in(const FineTip::Ahead& ahead, double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties);
+
+    /// What finer cells give up over the next `advance` per what the patch does, as far as that is known.
+    double finer_share(double gone) const;
 
   private:
     struct Pair {
@@ -62,15 +82,24 @@ class TipPatch {
         Eigen::MatrixXd flexibility;  // C [jumps x jumps] [m/N]
         Eigen::VectorXd jumps_of(const std::vector<Vec2>& displacement) const;  // w0 [m]
     };
-    Wood cut_out(const Discretisation& body, const CrackFields& ahead, int fields_now, const Boundary& boundary, const Vec2& tip,
-                 double reach, const std::vector<std::size_t>& passed) const;
+    Wood cut_out(const Discretisation& body, const InternalForce& internal_force, const CrackFields& ahead, int fields_now,
+                 const Boundary& boundary, const Vec2& tip, double reach, const std::vector<std::size_t>& passed) const;
     double potential(const Wood& wood, double at, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
+    std::vector<double> factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
+    double given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
     double beyond_outline(const std::function<double(const Wood&)>& of) const;
     double to_next_pair(double gone) const;
     bool is_idle() const { return woods_.empty() || pairs_.empty() || woods_.back().held.empty(); }
 
-    double cell_ = 0;          // way of the tip that frees a pair [m]
-    double advance_ = 0;       // what was asked for, or as far as the tip stays in the wood [m]
+    double cell_ = 0;     // way of the tip that frees a pair [m]
+    double advance_ = 0;  // what was asked for, or as far as the tip stays in the wood [m]
+    double slack_ = 0;    // [m]
+    double reach_ = 0;    // [m]
+    struct Known {
+        double from = 0;                  // how far the tip had gone [m]
+        std::vector<double> finer_share;  // from there on, at the first half of its ways
+    };
+    Known known_;
     std::vector<Pair> pairs_;  // on the way
     std::vector<Wood> woods_;  // the narrow one, the wide one; none where no more than the next cell is left
 };

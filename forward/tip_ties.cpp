@@ -133,10 +133,11 @@ bool TipTies::holds(const CrackFields& cracks, int crack, bool at_end) const {
     return std::any_of(live_.begin(), live_.end(), [&](std::size_t k) { return is_of(cracks, cracks.pairs[k], crack, at_end); });
 }
 
-std::vector<TipPatch::Softness> TipTies::softness(const CrackFields& cracks, int crack, bool at_end) const {
-    std::vector<TipPatch::Softness> found;
+std::vector<TipPatch::Tie> TipTies::of_tip(const CrackFields& cracks, int crack, bool at_end) const {
+    std::vector<TipPatch::Tie> found;
     for (const std::size_t k : live_)
-        if (is_of(cracks, cracks.pairs[k], crack, at_end)) found.push_back({cracks.pairs[k].node, ties_[k].softness});
+        if (is_of(cracks, cracks.pairs[k], crack, at_end))
+            found.push_back({cracks.pairs[k].node, ties_[k].softness, cracks.pairs[k].freed});
     return found;
 }
 

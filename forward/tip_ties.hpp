@@ -67,8 +67,8 @@ class TipTies {
     static bool is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end);
     bool holds(const CrackFields& cracks, int crack, bool at_end) const;
 
-    /// Of the ties of a tip.
-    std::vector<TipPatch::Softness> softness(const CrackFields& cracks, int crack, bool at_end) const;
+    /// Those of a tip.
+    std::vector<TipPatch::Tie> of_tip(const CrackFields& cracks, int crack, bool at_end) const;
 
   private:
     struct Tie {

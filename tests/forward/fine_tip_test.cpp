@@ -1,5 +1,6 @@
 // Energies of a crack that crosses a sharp boundary between woods.
 #include "forward/fine_tip.hpp"
+#include "forward/tip_patch.hpp"
 #include "tests/forward/cracked_plates.hpp"
 
 #include "datasets/io.hpp"
@@ -52,6 +53,40 @@ TEST(VerificationFineTip, EnergyReleasedAcrossASharpBoundary) {
                         "boxes %+.1f %%\n",
                         (boundary - 2e-3) / 0.1e-3, 1e3 * starts[k], 100 * error, 100 * (by_grid / 0.2e-3 / exact[k] - 1));
             EXPECT_LT(std::abs(error), 0.03) << boundary << " " << starts[k];
+        }
+    }
+}
+
+// What a tip in motion is told of its next 0.2 mm, in a specimen that stands still: what that releases at equilibrium, where it
+// is known (above).
+TEST(VerificationFineTip, RateOverAnAdvanceInMotion) {
+    constexpr double advance = 0.2e-3, middle = 6e-3;
+    for (const double boundary : {middle, middle + 0.05e-3}) {
+        for (const double start : {-0.4e-3, -0.2e-3, -0.1e-3, 0.0, 0.2e-3}) {
+            Scene scene = two_woods(boundary, boundary + start, 0.1e-3);
+            scene.specimen.size = {2 * middle, 2 * middle};
+            for (Vec2& x : scene.cracks[0].points) x.y() = middle;
+            const AtRest still(scene);
+            Trial run(at_motion(scene));
+            const CrackFields &cracks = run.solver.cracks(), &same = still.equilibrium.cracks();
+            std::vector<Vec2> u(still.equilibrium.displacements());
+            u.resize(cracks.fields());
+            for (const FieldPair& pair : cracks.pairs) {
+                const auto there = std::ranges::find(same.pairs, pair.node, &FieldPair::node);
+                for (const auto side : {&FieldPair::left, &FieldPair::right})
+                    u[pair.*side] = still.equilibrium.displacements()[there == same.pairs.end() ? pair.node : (*there).*side];
+            }
+            InternalForce wood(run.body, run.materials, false);
+            TipPatch patch(run.body, wood, cracks, Boundary(run.scene, run.body, cracks), 0, true, advance, 0.1e-3);
+            const double by_grid = patch.rates(0.0, u, {}).mean;
+            const std::vector<MaterialSlope> none;
+            FineTip fine(run.scene, run.plan, run.materials, run.body, none);
+            patch.take_in(fine.ahead(cracks, 0, true, u, patch.ways_from(0.0), patch.reach()), 0.0, u, {});
+            const double exact = released(scene, advance)[1] / advance, found = by_grid * patch.finer_share(0.0);
+            std::printf(
+                "boundary %.2f cells off a grid line, tip from %+.1f mm on: rate off by %+.1f %%, without fine boxes %+.1f %%\n",
+                (boundary - middle) / 0.1e-3, 1e3 * start, 100 * (found / exact - 1), 100 * (by_grid / exact - 1));
+            EXPECT_NEAR(found, exact, 0.07 * exact) << boundary << " " << start;
         }
     }
 }

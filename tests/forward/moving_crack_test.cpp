@@ -46,14 +46,16 @@ TEST(VerificationTipPatch, OneWood) {
                 u[f] = opening_field(x - tip, above);
             }
             const Boundary boundary(run.scene, run.body, cracks);
-            const TipPatch patch(run.body, cracks, boundary, 0, true, advance, h);
+            InternalForce wood(run.body, run.materials, false);
+            const TipPatch patch(run.body, wood, cracks, boundary, 0, true, advance, h);
             const auto [now, mean] = patch.rates(0.0, u, {});
             const double exact = (1 - 0.33 * 0.33) / 40e6 * scene.model.thickness;
             std::printf("advance of %.0f cells, tip %.2f of a cell along: mean rate %+.2f %% off, rate now %+.2f %%, pairs %.3f "
                         "as soft\n",
                         advance / h, place, 100 * (mean / exact - 1), 100 * (now / exact - 1), patch.softness(0.0, u));
             EXPECT_NEAR(mean, exact, 0.015 * exact);
-            EXPECT_NEAR(now, exact, 0.01 * exact);
+            // The potential goes linearly from pair to pair and through the middle between them; its slope swings by 0.9 %.
+            EXPECT_NEAR(now, exact, 0.012 * exact);
         }
     }
 }
