@@ -35,6 +35,10 @@ constexpr double most_repaid = 0.1;
 // larger.
 constexpr double least_load_for_finer = 0.5, most_rise_for_finer = 1.3;
 
+// In one wood pairs are hardly softer or stiffer than the formula has them: near other cracks and in sharp turns patches say
+// more.
+constexpr double most_softness_in_one_wood = 1.25;
+
 // A shorter way than this part of a cell waits for the next step.
 constexpr double least_way_in_cells = 1e-4;
 
@@ -56,7 +60,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     state.allowed = std::min(most_ahead_in_cells * cell, state.allowed + rayleigh * plan_.time_step);
 
     const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
-    state.opening += share * (opening_behind(cracks_, crack, at_end, cell, displacement_) - state.opening);
+    state.opening += share * (opening_behind(body_, cracks_, crack, at_end, displacement_, plan_.rotates) - state.opening);
 
     const TipTies::Motion motion{displacement_, velocity_, (0.5 + lag()) * plan_.time_step, (0.5 - lag()) * plan_.time_step};
     const double toughness = toughness_to_overcome(crack, at_end, wood.toughness) * body_.layout.thickness;  // [J/m]
@@ -97,12 +101,8 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (direction == tip.direction && cracks_.slide(crack, at_end, way)) {
         ties_.take_in(cracks_, mass_, displacement_, false);
     } else {
-        double softness = 1.0;
-        if (!materials_.homogeneous()) {
-            const TipPatch& patch = patch_of(crack, at_end);
-            softness =
-                patch.softness(patch.gone(ties_.of_tip(cracks_, crack, at_end), state.since_patch - way) + way, displacement_);
-        }
+        double softness = softness_at(crack, at_end, way);
+        if (materials_.homogeneous()) softness = std::clamp(softness, 1.0 / most_softness_in_one_wood, most_softness_in_one_wood);
         adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
     }
     given -= energy();
@@ -112,6 +112,25 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (bridges_) bridges_->take_in(cracks_, mass_);
 }
 
+// Of ties to come with the tip so far on.
+double ExplicitSolver::softness_at(int crack, bool at_end, double way) {
+    const TipPatch& patch = patch_of(crack, at_end);
+    const double since = tips_[2 * crack + at_end].since_patch;
+    return patch.softness(patch.gone(ties_.of_tip(cracks_, crack, at_end), since - way) + way, displacement_);
+}
+
+// How far from there edges or bodies hold the specimen or press on it [m].
+double ExplicitSolver::held_at(const Vec2& x) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Boundary::Held& held : boundary_.held)
+        least = std::min(least, (body_.layout.node_position(cracks_.node_of_field[held.field]) - x).norm());
+    for (const int driver : sliding_driver_) {
+        const Shape& shape = scene_.bodies[driver - boundary_.first_body()].shape;
+        least = std::min(least, nearest_on_outline(shape, x - moved(driver)).distance);
+    }
+    return least;
+}
+
 TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
     const CrackTip& tip = cracks_.lines[crack].tip(at_end);
     const double cell = body_.layout.cell.maxCoeff();
@@ -119,7 +138,8 @@ TipPatch& ExplicitSolver::patch_of(int crack, bool at_end) {
     if (!state.patch || state.since_patch > cell || state.patch_direction.dot(tip.direction) < most_turn_cosine) {
         const double advance = std::max(cell, scene_.cracks[crack].advance);
         if (!patch_force_) patch_force_.emplace(body_, materials_, false);
-        state.patch = std::make_unique<TipPatch>(body_, *patch_force_, cracks_, boundary_, crack, at_end, advance, cell);
+        state.patch = std::make_unique<TipPatch>(body_, *patch_force_, cracks_, boundary_, crack, at_end, advance, cell,
+                                                 held_at(tip.position));
         state.since_patch = state.finer_at = 0.0;
         state.patch_direction = tip.direction;
     }

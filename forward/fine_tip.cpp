@@ -157,14 +157,15 @@ bool is_pressed(const Scene& scene, const Discretisation& body, const Box& box, 
 
 // Whether a crack stands open behind its tip, and its faces touch nowhere in a box of the specimen: what is cut out is solved as
 // linear.
-bool is_open(const GridView& grid, bool at_end, const Box& box) {
-    const CrackLine& line = grid.cracks.lines[grid.crack];
-    const double opening = opening_behind(grid.cracks, grid.crack, at_end, grid.body.layout.cell.maxCoeff(), grid.displacement)
-                               .dot(left_of(line.direction_near(true, line.tip(at_end).position)));
-    return opening > 0.0 && std::ranges::none_of(grid.cracks.pairs, [&](const FieldPair& pair) {
+bool is_open(const GridView& grid, bool at_end, const Box& box, bool rotates) {
+    const CrackTip& tip = grid.cracks.lines[grid.crack].tip(at_end);
+    const Vec2 opening = opening_behind(grid.body, grid.cracks, grid.crack, at_end, grid.displacement, rotates);
+    const Mat2 turn = rotates ? turn_about(grid.body, tip, grid.displacement) : Mat2(Mat2::Identity());
+    return opening.dot(left_of(grid.cracks.lines[grid.crack].direction_near(true, tip.position))) > 0.0 &&
+           std::ranges::none_of(grid.cracks.pairs, [&](const FieldPair& pair) {
                return pair.crack == grid.crack && pair.freed >= 1.0 &&
                       box.contains(grid.origin + grid.body.layout.node_position(pair.node)) &&
-                      (grid.displacement[pair.left] - grid.displacement[pair.right]).dot(pair.normal) < 0.0;
+                      (grid.displacement[pair.left] - grid.displacement[pair.right]).dot(turn * pair.normal) < 0.0;
            });
 }
 
@@ -309,7 +310,7 @@ FineTip::Woods FineTip::make_woods(std::span<const TipBoxes* const> places) cons
 // Whether the grid misses something there.
 bool FineTip::counts(const TipPlace& place, const Equilibrium& equilibrium) const {
     const Box& outermost = place.boxes.boxes[0];
-    return is_open(view_of(body_, equilibrium, place.crack), place.at_end, outermost) &&
+    return is_open(view_of(body_, equilibrium, place.crack), place.at_end, outermost, rotates_) &&
            stands_alone(scene_, body_.layout, equilibrium.cracks(), place.crack, outermost, {}) &&
            !is_pressed(scene_, body_, outermost, equilibrium, small_.free_bodies);
 }
@@ -379,7 +380,7 @@ FineTip::Ahead FineTip::ahead(const CrackFields& cracks, int crack, bool at_end,
         if (found.potential.size() == 1) line.points.insert(at_end ? line.points.end() : line.points.begin(), tip.position);
         (at_end ? line.points.back() : line.points.front()) = tip.position;
         if (!at_rest.solve(line, crack, at_end, {body_, cracks, turned_back, Vec2::Zero(), crack}, false)) return {};
-        if (!is_open(at_rest.view(), at_end, outermost)) return {};
+        if (!is_open(at_rest.view(), at_end, outermost, false)) return {};
         std::vector<GridView> views{at_rest.view()};
         const auto missed = go_down(place, parts_of(place, line, {}), line, true, views);
         if (!missed) return {};

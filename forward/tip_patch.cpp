@@ -18,6 +18,8 @@ using Sparse = Eigen::SparseMatrix<double>;
 // Half width of the wide patch: so many advances, and so many cells at least.
 constexpr double advances_in_reach = 8.0;
 constexpr double least_cells_in_reach = 10.0;
+// Patches go on to sides of the specimen within so many times that: nothing holds those.
+constexpr double side_in_reach = 1.5;
 
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
 constexpr double least_stiffness = 1e-9;
@@ -47,7 +49,7 @@ Eigen::MatrixXd stiffness_of(const Discretisation& body, int p) {
 }  // namespace
 
 TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const CrackFields& cracks, const Boundary& boundary,
-                   int crack, bool at_end, double advance, double slack) {
+                   int crack, bool at_end, double advance, double slack, double held_at) {
     const CrackTip tip = cracks.lines[crack].tip(at_end);
     cell_ = way_past_a_node(tip.direction, body.layout.cell);
     // The crack as it will be, as far as that is wood.
@@ -57,6 +59,7 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
         way = std::min(way, *out - 1e-3 * h);
     advance_ = std::min(advance, way - slack);
     slack_ = slack;
+    held_at_ = held_at;
     if (advance_ <= 0.0) return;
     const auto points_before = body.points.node;
     CrackFields ahead = cracks;
@@ -77,23 +80,31 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
-    for (const double half_width : {0.5 * reach_, reach_})
-        woods_.push_back(cut_out(body, internal_force, ahead, cracks.fields(), boundary, tip.position, half_width, passed));
+    Box wide{tip.position.array() - reach_, tip.position.array() + reach_};
+    Box narrow{tip.position.array() - 0.5 * reach_, tip.position.array() + 0.5 * reach_};
+    for (int axis = 0; axis < 2; ++axis) {
+        const double beyond = side_in_reach * reach_, size = body.layout.size()[axis], at = tip.position[axis];
+        if (at <= beyond) narrow.low[axis] = wide.low[axis] = 0.0;
+        if (size - at <= beyond) narrow.high[axis] = wide.high[axis] = size;
+    }
+    for (const Box& box : {narrow, wide})
+        woods_.push_back(cut_out(body, internal_force, ahead, cracks.fields(), boundary, box, passed));
     body.points.node = points_before;
 }
 
 TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const InternalForce& internal_force, const CrackFields& ahead,
-                                 int fields_now, const Boundary& boundary, const Vec2& tip, double reach,
+                                 int fields_now, const Boundary& boundary, const Box& box,
                                  const std::vector<std::size_t>& passed) const {
     // Whether fields belong to the patch, and whether to wood beyond it too.
     Wood wood{};
     const int fields = ahead.fields();
     std::vector<bool> within(fields, false), beyond(fields, false);
     std::vector<int> cells;
-    body.for_cells_near(tip, reach, [&](int c) { cells.push_back(c); });
+    body.for_cells_in(box, [&](int c) { cells.push_back(c); });
     std::vector<bool> taken(body.layout.cells(), false);
     for (const int c : cells) taken[c] = true;
-    body.for_cells_near(tip, reach + 1.5 * body.layout.cell.maxCoeff(), [&](int c) {
+    const Vec2 beside = Vec2::Constant(1.5 * body.layout.cell.maxCoeff());
+    body.for_cells_in({box.low - beside, box.high + beside}, [&](int c) {
         for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p)
             for (const int f : body.points.node[p]) (taken[c] ? within : beyond)[f] = taken[c] || f < fields_now;
     });
@@ -248,8 +259,8 @@ double TipPatch::given(const Wood& wood, double gone, const std::vector<double>&
 }
 
 double TipPatch::beyond_outline(const std::function<double(const Wood&)>& of) const {
-    const double wide = of(woods_.back());
-    return woods_.back().is_whole ? wide : 2.0 * wide - of(woods_.front());
+    const double wide = of(woods_.back()), more = std::max(0.0, 1.0 - reach_ / held_at_);
+    return woods_.back().is_whole || more == 0.0 ? wide : wide + more * (wide - of(woods_.front()));
 }
 
 double TipPatch::softness(double gone, const std::vector<Vec2>& displacement) const {

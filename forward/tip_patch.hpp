@@ -23,8 +23,8 @@ namespace crampfit {
 /// patch's turn as a whole is taken off.
 ///
 /// The held outline takes up what a longer crack would pass on to the rest of the specimen, so that the rate falls on the way, by
-/// a part of it that goes with the way over the patch's size: two patches, one half as wide as the other, tell what it would be
-/// without (Richardson 1911).
+/// a part of it that goes with the way over the patch's size: two patches, one half as wide as the other but where that ends with
+/// the specimen, tell what it would be with an outline as far away as the specimen is held (Richardson 1911).
 class TipPatch {
   public:
     /// What holds the pair at a node (TipTies).
@@ -35,9 +35,9 @@ class TipPatch {
     };
 
     /// Leaves `body` as it was. `wood`: of small strain and without history, sorted for this patch alone. `slack` [m] is how far
-    /// the tip may go on before this patch is no longer good.
+    /// the tip may go on before this patch is no longer good, `held_at` [m] how far from it the specimen is held or pressed.
     TipPatch(Discretisation& body, InternalForce& wood, const CrackFields& cracks, const Boundary& boundary, int crack,
-             bool at_end, double advance, double slack);
+             bool at_end, double advance, double slack, double held_at);
 
     struct Rates {
         double now = 0;   // what the ties give up now
@@ -83,7 +83,7 @@ class TipPatch {
         Eigen::VectorXd jumps_of(const std::vector<Vec2>& displacement) const;  // w0 [m]
     };
     Wood cut_out(const Discretisation& body, const InternalForce& internal_force, const CrackFields& ahead, int fields_now,
-                 const Boundary& boundary, const Vec2& tip, double reach, const std::vector<std::size_t>& passed) const;
+                 const Boundary& boundary, const Box& box, const std::vector<std::size_t>& passed) const;
     double potential(const Wood& wood, double at, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
     std::vector<double> factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
     double given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
@@ -95,6 +95,7 @@ class TipPatch {
     double advance_ = 0;  // what was asked for, or as far as the tip stays in the wood [m]
     double slack_ = 0;    // [m]
     double reach_ = 0;    // [m]
+    double held_at_ = 0;  // [m]
     struct Known {
         double from = 0;                  // how far the tip had gone [m]
         std::vector<double> finer_share;  // from there on, at the first half of its ways

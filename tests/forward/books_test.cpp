@@ -365,5 +365,65 @@ TEST(VerificationBooks, AnEdgeThatStopsOverFacesThatRub) {
     EXPECT_NEAR(held.series.back().external_work, loaded.series.back().external_work, 1e-3 * loaded.series.back().external_work);
 }
 
+// What drag takes on faces that are pressed together is that of how they go, not of how they would go alone.
+TEST(VerificationBooks, DragOnClosedFaces) {
+    Scene scene = block({11e-3, 13e-3}, 0.5e-3);
+    scene.edges = {moving("top", Side::top, {0.0, -0.4}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.edges[0].until = 0.5e-3;
+    Crack crack;
+    crack.points = {Vec2(0.0, 6.53e-3), Vec2(11e-3, 6.53e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.solver.damping = 2e4;
+    scene.stop.time = 2e-3;
+    const Record record = simulate(scene);
+    std::printf("drag on closed faces: books %.5f\n", record.worst_energy_imbalance);
+    EXPECT_LT(record.worst_energy_imbalance, 1e-3);
+}
+
+// Facets of a block that shoots through between rough plates come and go from step to step.
+TEST(VerificationBooks, FrictionThatBeginsAndEndsWithinSteps) {
+    Scene scene = block({60e-3, 10e-3}, 0.5e-3);
+    Part part;
+    part.shape = Polygon{{{10e-3, 2.5e-3}, {25e-3, 2.5e-3}, {25e-3, 7.5e-3}, {10e-3, 7.5e-3}}};
+    part.velocity = {20.0, 0.0};
+    scene.specimen.parts = {part};
+    const auto plate = [](const char* name, double low, double high, double down) {
+        Body body;
+        body.name = name;
+        body.shape = Polygon{{{-50e-3, low}, {150e-3, low}, {150e-3, high}, {-50e-3, high}}};
+        body.velocity = Vec2(0.0, -down);
+        body.contact = {Contact::Kind::friction, 0.4};
+        return body;
+    };
+    scene.bodies = {plate("low", -2e-3, 2.5e-3, 0.0), plate("top", 7.5e-3, 12e-3, 0.01)};
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    scene.stop.time = 3e-3;
+    const Record record = simulate(scene);
+    std::printf("a block between rough plates: books %.4f\n", record.worst_energy_imbalance);
+    EXPECT_LT(record.worst_energy_imbalance, closed);
+}
+
+// Points that an outline leaves little of may be alone on their nodes.
+TEST(VerificationBooks, TrimmedPointsOfSmallDomainsStayCalm) {
+    for (const int points : {4, 9, 16, 25}) {
+        for (const double past : {0.01e-3, 0.02e-3, 0.03e-3, 0.04e-3}) {
+            Scene scene = block({6e-3, 6e-3}, 0.4e-3);
+            scene.model.points_per_cell = points;
+            const double edge = 4.8e-3 + past;
+            scene.specimen.cutouts = {Polygon{{{edge, 0}, {6e-3, 0}, {6e-3, 6e-3}, {0, 6e-3}, {0, edge}, {edge, edge}}}};
+            scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0}), without(moving("left", Side::left, {0.1, 0.0}), 1)};
+            scene.measure = {"bottom", "left"};
+            scene.solver.kind = SolverKind::explicit_dynamics;
+            scene.stop.time = 0.5e-3;
+            const Record record = simulate(scene);
+            EXPECT_EQ(record.status, RunStatus::finished) << points << " " << past;
+            EXPECT_LT(record.worst_energy_imbalance, closed) << points << " " << past;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace crampfit::test

@@ -47,7 +47,7 @@ TEST(VerificationTipPatch, OneWood) {
             }
             const Boundary boundary(run.scene, run.body, cracks);
             InternalForce wood(run.body, run.materials, false);
-            const TipPatch patch(run.body, wood, cracks, boundary, 0, true, advance, h);
+            const TipPatch patch(run.body, wood, cracks, boundary, 0, true, advance, h, INFINITY);
             const auto [now, mean] = patch.rates(0.0, u, {});
             const double exact = (1 - 0.33 * 0.33) / 40e6 * scene.model.thickness;
             std::printf("advance of %.0f cells, tip %.2f of a cell along: mean rate %+.2f %% off, rate now %+.2f %%, pairs %.3f "

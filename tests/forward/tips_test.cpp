@@ -596,5 +596,29 @@ TEST(SlowVerificationLaminatedStrip, EnergyOverARing) {
     for (const double lift : {0.0, 0.5}) check_laminated_strip(0.1e-3, lift);
 }
 
+// A specimen that turns as a whole takes its crack's opening along.
+TEST(UnitTipLoad, OpeningIsSeenInTheWoodsOwnFrame) {
+    Scene scene = at_rest({10e-3, 10e-3}, 0.5e-3);
+    scene.edges = {moving("top", Side::top, {1e-4, 3e-4}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 5.1e-3), Vec2(5e-3, 5.1e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    const AtRest run(scene);
+    ASSERT_TRUE(run.solved());
+    const CrackFields& cracks = run.equilibrium.cracks();
+    const std::vector<Vec2>& u = run.equilibrium.displacements();
+    const Vec2 still = opening_behind(run.body, cracks, 0, true, u, true);
+    const Vec2 small = opening_behind(run.body, cracks, 0, true, u, false);
+    EXPECT_LT((still - small).norm(), 0.05 * small.norm());
+    const Mat2 turn = (Mat2() << std::cos(2.0), -std::sin(2.0), std::sin(2.0), std::cos(2.0)).finished();
+    std::vector<Vec2> turned(u.size());
+    for (std::size_t f = 0; f < u.size(); ++f) {
+        const Vec2 x = run.body.layout.node_position(cracks.node_of_field[f]);
+        turned[f] = turn * (x + u[f]) - x;
+    }
+    EXPECT_LT((opening_behind(run.body, cracks, 0, true, turned, true) - still).norm(), 1e-9 * still.norm());
+}
+
 }  // namespace
 }  // namespace crampfit::test
