@@ -169,13 +169,12 @@ double ExplicitSolver::toughness_to_overcome(int crack, bool at_end, double here
 // Nothing where bodies have come near, nor where wood remembers or fibres hold the faces: patches know of neither.
 FineTip::Ahead ExplicitSolver::finer_ahead(int crack, bool at_end, const TipPatch& patch, double gone) {
     if (plan_.remembers || bridges_ || body_.layout.degree > 1) return {};
-    const Vec2 tip = cracks_.lines[crack].tip(at_end).position, reach = Vec2::Constant(patch.reach());
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Box at = bounds(scene_.bodies[b].shape);
         const Vec2 moved_by = moved(boundary_.first_body() + static_cast<int>(b));
-        if (Box{tip - reach, tip + reach}.touches({at.low + moved_by, at.high + moved_by})) return {};
+        if (patch.box().touches({at.low + moved_by, at.high + moved_by})) return {};
     }
-    return fine_tip_.ahead(cracks_, crack, at_end, displacement_, patch.ways_from(gone), patch.reach());
+    return fine_tip_.ahead(cracks_, crack, at_end, displacement_, patch.ways_from(gone), patch.box());
 }
 
 void ExplicitSolver::note_speed(Tip& state, double way) {

@@ -355,7 +355,7 @@ std::vector<MissedEnergy> FineTip::missed(const std::vector<TipPlace>& places, c
 }
 
 FineTip::Ahead FineTip::ahead(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement,
-                              const std::vector<double>& ways, double reach) {
+                              const std::vector<double>& ways, const Box& box) {
     CrackLine line = cracks.lines[crack];
     CrackTip& tip = line.tip(at_end);
     const Vec2 start = tip.position;
@@ -363,7 +363,7 @@ FineTip::Ahead FineTip::ahead(const CrackFields& cracks, int crack, bool at_end,
     if (!boxes) return {};
     const Vec2& cell = body_.layout.cell;
     const Box within{Vec2::Zero(), body_.layout.size()}, &outermost = boxes->boxes[0];
-    Box around = box_around({start, start}, reach / cell.maxCoeff(), pitches[0], cell, within);
+    Box around = box_around(box, 0.0, pitches[0], cell, within);
     around = {around.low.cwiseMin((outermost.low - cell).cwiseMax(within.low)),
               around.high.cwiseMax((outermost.high + cell).cwiseMin(within.high))};
     if (!stands_alone(scene_, body_.layout, cracks, crack, around, {})) return {};

@@ -68,11 +68,11 @@ class FineTip {
         std::vector<double> potential;  // [J]
     };
 
-    /// Around a tip of a specimen in motion: the potential of the wood within `reach` of it [m], brought to rest with its outline
-    /// held where it is and seen with finer cells at the tip, with that so far straight on as each of the rising `ways` says,
-    /// from nil on [m]. None where `about` has no boxes or something else acts in that wood, nor where the crack is closed.
+    /// Around a tip of a specimen in motion: the potential of the wood in a box, brought to rest with its outline held where it
+    /// is and seen with finer cells at the tip, with that so far straight on as each of the rising `ways` says, from nil on [m].
+    /// None where `about` has no boxes or something else acts in that wood, nor where the crack is closed.
     Ahead ahead(const CrackFields& cracks, int crack, bool at_end, const std::vector<Vec2>& displacement,
-                const std::vector<double>& ways, double reach);
+                const std::vector<double>& ways, const Box& box);
 
   private:
     struct Parts {

@@ -80,14 +80,14 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
-    Box wide{tip.position.array() - reach_, tip.position.array() + reach_};
+    wide_ = {tip.position.array() - reach_, tip.position.array() + reach_};
     Box narrow{tip.position.array() - 0.5 * reach_, tip.position.array() + 0.5 * reach_};
     for (int axis = 0; axis < 2; ++axis) {
         const double beyond = side_in_reach * reach_, size = body.layout.size()[axis], at = tip.position[axis];
-        if (at <= beyond) narrow.low[axis] = wide.low[axis] = 0.0;
-        if (size - at <= beyond) narrow.high[axis] = wide.high[axis] = size;
+        if (at <= beyond) narrow.low[axis] = wide_.low[axis] = 0.0;
+        if (size - at <= beyond) narrow.high[axis] = wide_.high[axis] = size;
     }
-    for (const Box& box : {narrow, wide})
+    for (const Box& box : {narrow, wide_})
         woods_.push_back(cut_out(body, internal_force, ahead, cracks.fields(), boundary, box, passed));
     body.points.node = points_before;
 }

@@ -56,8 +56,8 @@ class TipPatch {
     /// the formula of `FieldPair::compliance` does not know of boundaries in the wood.
     double softness(double gone, const std::vector<Vec2>& displacement) const;
 
-    /// How far the wide patch reaches from where the tip was [m].
-    double reach() const { return reach_; }
+    /// The wide patch.
+    const Box& box() const { return wide_; }
 
     /// Ways of a tip that has `gone` so far already, at whose ends it hangs what finer cells give up [m].
     std::vector<double> ways_from(double gone) const;
@@ -96,6 +96,7 @@ class TipPatch {
     double slack_ = 0;    // [m]
     double reach_ = 0;    // [m]
     double held_at_ = 0;  // [m]
+    Box wide_;
     struct Known {
         double from = 0;                  // how far the tip had gone [m]
         std::vector<double> finer_share;  // from there on, at the first half of its ways

@@ -75,7 +75,7 @@ std::array<double, 2> told_in_motion(const Scene& scene, double advance, double 
     const double by_grid = patch.rates(0.0, u, {}).mean;
     const std::vector<MaterialSlope> none;
     FineTip fine(run.scene, run.plan, run.materials, run.body, none);
-    patch.take_in(fine.ahead(cracks, 0, true, u, patch.ways_from(0.0), patch.reach()), 0.0, u, {});
+    patch.take_in(fine.ahead(cracks, 0, true, u, patch.ways_from(0.0), patch.box()), 0.0, u, {});
     return {by_grid, by_grid * patch.finer_share(0.0)};
 }
 
