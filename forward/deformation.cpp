@@ -2,7 +2,19 @@
 
 #include <Eigen/LU>
 
+#include <algorithm>
+
 namespace crampfit {
+
+Mat2 mean_gradient(const Discretisation& body, const Box& box, const std::vector<Vec2>& field) {
+    Mat2 sum = Mat2::Zero();
+    int points = 0;
+    body.for_points_in(box, [&](int p) {
+        sum += gradient_at(body, p, field);
+        ++points;
+    });
+    return sum / std::max(1, points);
+}
 
 Mat2 seen_gradient_at(const Discretisation& body, int p, const std::vector<Vec2>& displacement, bool rotates) {
     const Mat2 at_point = gradient_at(body, p, displacement);

@@ -164,6 +164,9 @@ inline Mat2 gradient_at(const Discretisation& body, int p, const std::vector<Vec
     return gradient;
 }
 
+/// Its mean over the points of a box; nil where there are none.
+Mat2 mean_gradient(const Discretisation& body, const Box& box, const std::vector<Vec2>& field);
+
 /// Gradient at a point of the displacement as its energy knows it. A cell whose points are all on the same fields bends as wood
 /// does: what its strain changes by across it, q = (u_0 - u_1 - u_2 + u_3) / (h_x h_y), puts stress along x and y on it alone
 /// (`InternalForce`), so that its sides curve by as much as that takes.

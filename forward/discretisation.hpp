@@ -218,6 +218,14 @@ class Discretisation {
             for (int i = low % layout.cells_x; i <= high % layout.cells_x; ++i) visit(layout.cell_index(i, j));
     }
 
+    /// Calls `visit(p)` for every point of the cells of which a box holds half or more.
+    template <class Visit>
+    void for_points_in(const Box& box, Visit visit) const {
+        for_cells_in({box.low + 0.5 * layout.cell, box.high - 0.5 * layout.cell}, [&](int c) {
+            for (int p = points.first_of_cell[c]; p < points.first_of_cell[c + 1]; ++p) visit(p);
+        });
+    }
+
   private:
     bool points_are_together(int c) const;  // on the same fields
     void find_weights(ShapeFunction kind);

@@ -506,22 +506,20 @@ bool in_one_wood(const Discretisation& body, const MaterialMap& materials, const
 
 Mat2 turn_about(const Discretisation& body, const CrackTip& tip, const std::vector<Vec2>& displacement) {
     constexpr double reach_in_cells = 3.0;
-    Mat2 sum = Mat2::Zero();
-    double volume = 0.0;
-    body.for_cells_near(tip.position, reach_in_cells * body.layout.cell.maxCoeff(), [&](int c) {
-        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) {
-            sum += body.points.volume[p] * gradient_at(body, p, displacement);
-            volume += body.points.volume[p];
-        }
-    });
-    return volume > 0.0 ? Polar(sum / volume).turn : Mat2(Mat2::Identity());
+    const Vec2 reach = reach_in_cells * body.layout.cell;
+    return Polar(mean_gradient(body, {tip.position - reach, tip.position + reach}, displacement)).turn;
 }
 
 Vec2 opening_behind(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end,
-                    const std::vector<Vec2>& displacement, bool rotates) {
-    const CrackLine& line = cracks.lines[crack];
-    const Vec2 jump = cracks.opening(crack, line.behind(at_end, 1.5 * body.layout.cell.maxCoeff()), displacement);
-    return rotates ? Vec2(turn_about(body, line.tip(at_end), displacement).transpose() * jump) : jump;
+                    const std::vector<Vec2>& displacement) {
+    const Vec2 behind = cracks.lines[crack].behind(at_end, 1.5 * body.layout.cell.maxCoeff());
+    return cracks.opening(crack, behind, displacement);
+}
+
+Vec2 opening_in_own_frame(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end,
+                          const std::vector<Vec2>& displacement, bool rotates) {
+    const Vec2 jump = opening_behind(body, cracks, crack, at_end, displacement);
+    return rotates ? Vec2(turn_about(body, cracks.lines[crack].tip(at_end), displacement).transpose() * jump) : jump;
 }
 
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
@@ -538,7 +536,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
     load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, body.layout.thickness);
-    load.opening = opening_behind(body, cracks, crack, at_end, state.displacement, options.rotates);
+    load.opening = opening_in_own_frame(body, cracks, crack, at_end, state.displacement, options.rotates);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, cracks, line, at_end, field, anywhere, state, pieces, options.rotates);

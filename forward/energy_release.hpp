@@ -16,21 +16,23 @@ struct NodalState {
 };
 
 struct TipLoad {
-    double G = 0;     // energy release rate [J/m^2]
-    double K_I = 0;   // [Pa sqrt(m)]
-    double K_II = 0;  // [Pa sqrt(m)]
-    Vec2 opening =
-        Vec2::Zero();      // displacement jump just behind the tip, the left face less the right, as `opening_behind` has it [m]
-    double toughness = 0;  // of the wood at the tip [J/m^2]
+    double G = 0;                 // energy release rate [J/m^2]
+    double K_I = 0;               // [Pa sqrt(m)]
+    double K_II = 0;              // [Pa sqrt(m)]
+    Vec2 opening = Vec2::Zero();  // displacement jump just behind the tip in the wood's own frame [m]
+    double toughness = 0;         // of the wood at the tip [J/m^2]
 };
 
 /// How the wood about a tip has turned, on the mean over some cells.
 Mat2 turn_about(const Discretisation& body, const CrackTip& tip, const std::vector<Vec2>& displacement);
 
-/// Displacement jump just behind a tip, the left face less the right [m]. With `rotates` seen by one who has turned as the wood
-/// about the tip has: a turn of the specimen turns no crack.
+/// Displacement jump just behind a tip, the left face less the right [m].
 Vec2 opening_behind(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end,
-                    const std::vector<Vec2>& displacement, bool rotates);
+                    const std::vector<Vec2>& displacement);
+
+/// The same with `rotates` seen by one who has turned as the wood about the tip has: a turn of the specimen turns no crack.
+Vec2 opening_in_own_frame(const Discretisation& body, const CrackFields& cracks, int crack, bool at_end,
+                          const std::vector<Vec2>& displacement, bool rotates);
 
 /// Radii of the virtual extension, in cells. It shrinks where other wood is near, so that little hangs on the gradient term,
 /// and keeps off other cracks.

@@ -59,8 +59,12 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     const double rayleigh = rayleigh_speed(in_axes(wood.elasticity.stiffness(), tip.direction), wood.density);
     state.allowed = std::min(most_ahead_in_cells * cell, state.allowed + rayleigh * plan_.time_step);
 
-    const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
-    state.opening += share * (opening_behind(body_, cracks_, crack, at_end, displacement_, plan_.rotates) - state.opening);
+    const GrowthDirection criterion = scene_.cracks[crack].direction;
+    if (criterion == GrowthDirection::normal_to_opening) {
+        const double share = std::min(1.0, rayleigh * plan_.time_step / (cells_in_mean * cell));
+        const Vec2 opening = opening_in_own_frame(body_, cracks_, crack, at_end, displacement_, plan_.rotates);
+        state.opening += share * (opening - state.opening);
+    }
 
     const TipTies::Motion motion{displacement_, velocity_, (0.5 + lag()) * plan_.time_step, (0.5 - lag()) * plan_.time_step};
     const double toughness = toughness_to_overcome(crack, at_end, wood.toughness) * body_.layout.thickness;  // [J/m]
@@ -75,7 +79,6 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (way < least_way_in_cells * cell) return;
 
     Vec2 direction = tip.direction;
-    const GrowthDirection criterion = scene_.cracks[crack].direction;
     const bool by_intensities = steered_by_intensities(criterion);
     const double leg = (by_intensities ? least_leg_in_cells(cracks_.lines[crack], at_end) : leg_in_cells) * cell;
     if (state.since_turn >= leg) {

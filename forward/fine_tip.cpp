@@ -159,9 +159,9 @@ bool is_pressed(const Scene& scene, const Discretisation& body, const Box& box, 
 // linear.
 bool is_open(const GridView& grid, bool at_end, const Box& box, bool rotates) {
     const CrackTip& tip = grid.cracks.lines[grid.crack].tip(at_end);
-    const Vec2 opening = opening_behind(grid.body, grid.cracks, grid.crack, at_end, grid.displacement, rotates);
     const Mat2 turn = rotates ? turn_about(grid.body, tip, grid.displacement) : Mat2(Mat2::Identity());
-    return opening.dot(left_of(grid.cracks.lines[grid.crack].direction_near(true, tip.position))) > 0.0 &&
+    const Vec2 opening = opening_behind(grid.body, grid.cracks, grid.crack, at_end, grid.displacement);
+    return opening.dot(turn * left_of(grid.cracks.lines[grid.crack].direction_near(true, tip.position))) > 0.0 &&
            std::ranges::none_of(grid.cracks.pairs, [&](const FieldPair& pair) {
                return pair.crack == grid.crack && pair.freed >= 1.0 &&
                       box.contains(grid.origin + grid.body.layout.node_position(pair.node)) &&
@@ -171,23 +171,6 @@ bool is_open(const GridView& grid, bool at_end, const Box& box, bool rotates) {
 
 GridView view_of(const Discretisation& body, const Equilibrium& equilibrium, int crack) {
     return {body, equilibrium.cracks(), equilibrium.displacements(), Vec2::Zero(), crack};
-}
-
-template <class Visit>
-void for_points_in(const Discretisation& body, const Box& box, const Visit& visit) {
-    body.for_cells_in({box.low + 0.5 * body.layout.cell, box.high - 0.5 * body.layout.cell}, [&](int c) {
-        for (int p = body.points.first_of_cell[c]; p < body.points.first_of_cell[c + 1]; ++p) visit(p);
-    });
-}
-
-Mat2 mean_gradient(const Discretisation& body, const Box& box, const std::vector<Vec2>& displacement) {
-    Mat2 sum = Mat2::Zero();
-    int points = 0;
-    for_points_in(body, box, [&](int p) {
-        sum += gradient_at(body, p, displacement);
-        ++points;
-    });
-    return sum / points;
 }
 
 // The turn of a box as a whole, taken off the displacements: what is left is small.
@@ -206,9 +189,9 @@ void add_slope_of_turn(const Discretisation& body, const Box& box, const Mat2& g
     // The turn's angle is that of (c, w) in `Polar`.
     const double c = 2.0 + gradient.trace(), w = gradient(1, 0) - gradient(0, 1);
     int points = 0;
-    for_points_in(body, box, [&](int) { ++points; });
+    body.for_points_in(box, [&](int) { ++points; });
     const Vec2 by = moment / (points * (c * c + w * w)) * Vec2(c, w);
-    for_points_in(body, box, [&](int p) {
+    body.for_points_in(box, [&](int p) {
         const CellWeights& weights = body.weights[body.points.slot[p]];
         const auto node = body.points.node[p];
         for (std::size_t k = 0; k < node.size(); ++k) {

@@ -228,7 +228,7 @@ void Recorder::finish(RunStatus status, std::string message) {
     if (record_.series.back().time < solver_.time()) save_row();
     if (!finite_) {
         record_.status = RunStatus::unstable;
-        record_.message = "a displacement became infinite";
+        record_.message = "a displacement or an energy became infinite";
     }
     for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.back() = since_last_row_[d];
     if (!record_.reactions.empty()) record_.series.back().force = force_of(record_.series.size() - 1);

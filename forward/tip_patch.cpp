@@ -24,6 +24,12 @@ constexpr double side_in_reach = 1.5;
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
 constexpr double least_stiffness = 1e-9;
 
+// Pairs so far beyond the next advance count too: how soft a pair is hangs on what the next two give up.
+constexpr double cells_beyond = 2.0;
+
+// From cell to cell the rate changes by this part of it at most in one wood.
+constexpr double most_bend = 0.25;
+
 // A pair is never taken for stiffer, or softer, than by this.
 constexpr double least_softness = 0.05;
 
@@ -54,16 +60,16 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
     cell_ = way_past_a_node(tip.direction, body.layout.cell);
     // The crack as it will be, as far as that is wood.
     const double h = body.layout.cell.maxCoeff();
-    double way = advance + slack;
+    way_ = advance + slack + cells_beyond * cell_;
     if (const auto out = exit_distance(tip.position, tip.direction, {Vec2::Zero(), body.layout.size()}))
-        way = std::min(way, *out - 1e-3 * h);
-    advance_ = std::min(advance, way - slack);
+        way_ = std::min(way_, *out - 1e-3 * h);
+    advance_ = std::min(advance, way_ - slack);
     slack_ = slack;
     held_at_ = held_at;
     if (advance_ <= 0.0) return;
     const auto points_before = body.points.node;
     CrackFields ahead = cracks;
-    ahead.grow(crack, at_end, tip.position + way * tip.direction);
+    ahead.grow(crack, at_end, tip.position + way_ * tip.direction);
     internal_force.sort_cells();
 
     reach_ = std::max(advances_in_reach * advance, least_cells_in_reach * h);
@@ -76,7 +82,7 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
         const Vec2 place = body.layout.node_position(pair.node);
         const double freed = share_freed(place, tip, body.layout);
         const bool is_near = (place - tip.position).cwiseAbs().maxCoeff() < 0.5 * reach_ - h;  // a crack may come back on itself
-        if (!is_near || freed >= 1.0 || freed + way / cell_ <= 0.0) continue;
+        if (!is_near || freed >= 1.0 || freed + way_ / cell_ <= 0.0) continue;
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
@@ -248,39 +254,32 @@ double TipPatch::to_next_pair(double gone) const {
     return next;
 }
 
-// Over the next advance [J]. From where the tip is at a pair to where it is at the next one the potential goes linearly: so it
-// will when it is there.
+// Over the next advance [J].
 double TipPatch::given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const {
-    const double next = to_next_pair(gone), cells = (advance_ - next) / cell_, whole = std::floor(cells);
-    const double last = gone + next + whole * cell_;
-    const auto at = [&](double place) { return potential(wood, place, softness, jumps); };
-    const double before = at(last);
-    return at(gone) - std::lerp(before, at(last + cell_), cells - whole);
+    return potential(wood, gone, softness, jumps) - potential(wood, gone + advance_, softness, jumps);
 }
 
-double TipPatch::beyond_outline(const std::function<double(const Wood&)>& of) const {
-    const double wide = of(woods_.back()), more = std::max(0.0, 1.0 - reach_ / held_at_);
-    return woods_.back().is_whole || more == 0.0 ? wide : wide + more * (wide - of(woods_.front()));
-}
-
+// Half way between two places where it begins to free a pair the potential is that of a parabola through these and the next one:
+// a straight line would not know that the rate changes on the way.
 double TipPatch::softness(double gone, const std::vector<Vec2>& displacement) const {
     if (is_idle()) return 1.0;
-    const double from = gone + to_next_pair(gone);
-    const double found = beyond_outline([&](const Wood& wood) {
-        const Eigen::VectorXd jumps = wood.jumps_of(displacement);
-        if (jumps.isZero()) return 1.0;
-        const auto at = [&](double place, double factor) {
-            return potential(wood, place, std::vector<double>(pairs_.size(), factor), jumps);
-        };
-        const double middle = 0.5 * (at(from, 1.0) + at(from + cell_, 1.0));
-        double low = std::log(least_softness), high = -low;
-        for (int k = 0; k < 12; ++k) {
-            const double trial = 0.5 * (low + high);
-            (at(from + 0.5 * cell_, std::exp(trial)) > middle ? low : high) = trial;
-        }
-        return std::exp(0.5 * (low + high));
-    });
-    return std::clamp(found, least_softness, 1.0 / least_softness);
+    const Wood& wood = woods_.back();
+    const Eigen::VectorXd jumps = wood.jumps_of(displacement);
+    if (jumps.isZero()) return 1.0;
+    const auto at = [&](double place, double factor) {
+        return potential(wood, place, std::vector<double>(pairs_.size(), factor), jumps);
+    };
+    const double from = gone + to_next_pair(gone), first = at(from, 1.0), second = at(from + cell_, 1.0);
+    // Across a boundary in the wood a parabola means nothing: as much of it counts as a smooth one could have.
+    const double drop = first - second, next = from + 2.0 * cell_ <= way_ ? second - at(from + 2.0 * cell_, 1.0) : drop;
+    const double most = most_bend * std::max(0.0, std::min(drop, next)), bend = std::clamp(drop - next, -most, most);
+    const double middle = 0.5 * (first + second) - 0.125 * bend;
+    double low = std::log(least_softness), high = -low;
+    for (int k = 0; k < 12; ++k) {
+        const double trial = 0.5 * (low + high);
+        (at(from + 0.5 * cell_, std::exp(trial)) > middle ? low : high) = trial;
+    }
+    return std::exp(0.5 * (low + high));
 }
 
 std::vector<double> TipPatch::factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const {
@@ -325,13 +324,15 @@ TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displaceme
     const std::vector<double> factors = factors_of(gone, displacement, ties);
     const double next = to_next_pair(gone), on = next > least_way * cell_ ? std::min(next, little * cell_) : little * cell_;
     double now = 0.0;
-    const double now_over_mean = beyond_outline([&](const Wood& wood) {
+    const auto now_over_mean_in = [&](const Wood& wood) {
         const Eigen::VectorXd jumps = wood.jumps_of(displacement);
         const auto at = [&](double place) { return potential(wood, place, factors, jumps); };
-        const double rate = (at(gone) - at(gone + on)) / on;
-        if (&wood == &woods_.back()) now = rate;
-        return rate * advance_ / given(wood, gone, factors, jumps);
-    });
+        now = (at(gone) - at(gone + on)) / on;
+        return now * advance_ / given(wood, gone, factors, jumps);
+    };
+    const double narrow = now_over_mean_in(woods_.front()), wide = now_over_mean_in(woods_.back());
+    const double more = woods_.back().is_whole ? 0.0 : std::max(0.0, 1.0 - reach_ / held_at_);
+    const double now_over_mean = wide + more * (wide - narrow);
     if (!(now_over_mean > 0.0)) return {};
     return {now, now / now_over_mean};
 }

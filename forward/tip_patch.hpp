@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -52,7 +51,7 @@ class TipPatch {
     /// where there is no load, or no more than the next cell is left.
     Rates rates(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
 
-    /// What the compliances of the next pairs must be multiplied by for the potential to go linearly while the tip passes them;
+    /// What the compliances of the next pairs must be multiplied by for the potential to go evenly while the tip passes them;
     /// the formula of `FieldPair::compliance` does not know of boundaries in the wood.
     double softness(double gone, const std::vector<Vec2>& displacement) const;
 
@@ -87,13 +86,13 @@ class TipPatch {
     double potential(const Wood& wood, double at, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
     std::vector<double> factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
     double given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
-    double beyond_outline(const std::function<double(const Wood&)>& of) const;
     double to_next_pair(double gone) const;
     bool is_idle() const { return woods_.empty() || pairs_.empty() || woods_.back().held.empty(); }
 
     double cell_ = 0;     // way of the tip that frees a pair [m]
     double advance_ = 0;  // what was asked for, or as far as the tip stays in the wood [m]
     double slack_ = 0;    // [m]
+    double way_ = 0;      // of the tip whose pairs it knows [m]
     double reach_ = 0;    // [m]
     double held_at_ = 0;  // [m]
     Box wide_;
