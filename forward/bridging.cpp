@@ -15,8 +15,8 @@ constexpr double places_in_cell = 16.0;  // along a crack, at which its faces ar
 // Ties are made softer for bridges that soften as fast as the wood yields to no more than this part of the wood's stiffness.
 constexpr double least_stiffness_left = 0.1;
 
-double opening_of(const FieldPair& pair, const std::vector<Vec2>& displacement) {
-    return (displacement[pair.left] - displacement[pair.right]).dot(pair.normal);
+double opening_of(const FieldPair& pair, const Vec2& normal, const std::vector<Vec2>& displacement) {
+    return (displacement[pair.left] - displacement[pair.right]).dot(normal);
 }
 
 }  // namespace
@@ -156,34 +156,35 @@ void BridgedFaces::take_in(const CrackFields& cracks, const std::vector<double>&
     }
 }
 
-BridgeState BridgedFaces::state(const CrackFields& cracks, std::size_t k, const std::vector<Vec2>& displacement) const {
-    const FieldPair& pair = cracks.pairs[k];
-    const Bridge& bridge = bridges_[k];
-    const double opening = opening_of(pair, displacement);
+BridgeState BridgedFaces::state(const FieldPair& pair, const Bridge& bridge, double opening) const {
     return bridge_state(*scene_.cracks[pair.crack].faces.bridging, bridge.stiffest / bridge.area,
                         std::max(bridge.largest, opening), opening);
 }
 
-void BridgedFaces::pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) {
+void BridgedFaces::pull(const CrackFields& cracks, const FaceNormals& normals, const std::vector<Vec2>& displacement,
+                        std::vector<Vec2>& force) {
     for (const std::size_t k : live_) {
         const FieldPair& pair = cracks.pairs[k];
         Bridge& bridge = bridges_[k];
-        bridge.largest = std::max(bridge.largest, opening_of(pair, displacement));
-        bridge.force = bridge.area * state(cracks, k, displacement).traction;
-        force[pair.left] -= bridge.force * pair.normal;
-        force[pair.right] += bridge.force * pair.normal;
+        const double opening = opening_of(pair, normals[k], displacement);
+        bridge.largest = std::max(bridge.largest, opening);
+        bridge.force = bridge.area * state(pair, bridge, opening).traction;
+        force[pair.left] -= bridge.force * normals[k];
+        force[pair.right] += bridge.force * normals[k];
     }
 }
 
-void BridgedFaces::add_to(std::vector<Vec2>& faces, const CrackFields& cracks) const {
-    faces.resize(cracks.pairs.size(), Vec2::Zero());
-    for (const std::size_t k : live_) faces[k] -= bridges_[k].force * cracks.pairs[k].normal;
+void BridgedFaces::add_to(std::vector<Vec2>& faces, const FaceNormals& normals) const {
+    faces.resize(bridges_.size(), Vec2::Zero());
+    for (const std::size_t k : live_) faces[k] -= bridges_[k].force * normals[k];
 }
 
-BridgedFaces::Energies BridgedFaces::energies(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {
+BridgedFaces::Energies BridgedFaces::energies(const CrackFields& cracks, const FaceNormals& normals,
+                                              const std::vector<Vec2>& displacement) const {
     Energies sum;
     for (const std::size_t k : live_) {
-        const BridgeState now = state(cracks, k, displacement);
+        const FieldPair& pair = cracks.pairs[k];
+        const BridgeState now = state(pair, bridges_[k], opening_of(pair, normals[k], displacement));
         sum.stored += bridges_[k].area * now.stored;
         sum.dissipated += bridges_[k].area * now.dissipated;
     }

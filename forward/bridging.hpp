@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/cracks.hpp"
+#include "forward/face_normals.hpp"
 
 #include <vector>
 
@@ -18,11 +18,11 @@ struct BridgeState {
 BridgeState bridge_state(const Bridging& law, double steepest, double largest, double opening);
 
 /// Bridged crack faces in motion. Each pair of fields carries the traction on a part of the crack's faces, by its own jump along
-/// the normal: that part of the crack's length on which its shape function stands for the jump. Faces that have not opened are
-/// rigid: the whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a tip comes to is
-/// bridged before the tip frees it, which takes no energy, and what the tip gives up while it passes is what is left for it by
-/// the bridges. Where the faces of the start are not bridged nor are pairs that the tip has begun to free by then: growth begins
-/// at the toughness of the tip.
+/// the normal as the wood has turned: that part of the crack's length on which its shape function stands for the jump. Faces that
+/// have not opened are rigid: the whole stress of the law pulls on them, and contact keeps them from closing. So a pair that a
+/// tip comes to is bridged before the tip frees it, which takes no energy, and what the tip gives up while it passes is what is
+/// left for it by the bridges. Where the faces of the start are not bridged nor are pairs that the tip has begun to free by then:
+/// growth begins at the toughness of the tip.
 class BridgedFaces {
   public:
     /// Bridges may add as much to the squared frequency of a pair that the tip has freed [1/s^2].
@@ -40,15 +40,16 @@ class BridgedFaces {
     void take_in(const CrackFields& cracks, const std::vector<double>& mass);
 
     /// Adds the tractions to the forces of the fields [N].
-    void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);
+    void pull(const CrackFields& cracks, const FaceNormals& normals, const std::vector<Vec2>& displacement,
+              std::vector<Vec2>& force);
 
     /// Adds the last tractions to what faces put on the left one of each pair [pairs] [N].
-    void add_to(std::vector<Vec2>& faces, const CrackFields& cracks) const;
+    void add_to(std::vector<Vec2>& faces, const FaceNormals& normals) const;
 
     struct Energies {
         double stored = 0, dissipated = 0;  // [J]
     };
-    Energies energies(const CrackFields& cracks, const std::vector<Vec2>& displacement) const;
+    Energies energies(const CrackFields& cracks, const FaceNormals& normals, const std::vector<Vec2>& displacement) const;
 
   private:
     struct Bridge {
@@ -60,7 +61,7 @@ class BridgedFaces {
     void bridge_notch(int crack, const CrackFields& cracks, const std::vector<double>& mass);
     double area_ahead(const CrackFields& cracks, const FieldPair& pair) const;
     bool is_cut(int node, const Vec2& on_crack, const Vec2& along) const;
-    BridgeState state(const CrackFields& cracks, std::size_t pair, const std::vector<Vec2>& displacement) const;
+    BridgeState state(const FieldPair& pair, const Bridge& bridge, double opening) const;
 
     const Scene& scene_;
     const Discretisation& body_;

@@ -294,17 +294,18 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
 // middle. Faces that press have no jump across them for the pressure to work on: what the grid shows there, where one of two rows
 // of nodes beside the crack presses, would take up to 5 % off near mode II.
 double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& cracks, int crack, bool at_end,
-                      const Extension& extension, const std::vector<Vec2>& displacement, double thickness) {
+                      const Extension& extension, const std::vector<Vec2>& displacement, const Mat2& turn, double thickness) {
     const CrackLine& line = cracks.lines[crack];
     double sum = 0.0;
     for (const FacePiece& piece : pieces) {
-        const double size = extension.size_at(line.behind(at_end, 0.5 * (piece.near + piece.far)));
+        const Vec2 middle = line.behind(at_end, 0.5 * (piece.near + piece.far));
+        const double size = extension.size_at(middle);
         if (size == 0.0 || piece.far <= piece.near) continue;
         const auto jump = [&](double behind) {
             return Vec2((at_end ? 1.0 : -1.0) * cracks.opening(crack, line.behind(at_end, behind), displacement));
         };
         const Vec2 at_near = piece.near > 0.0 ? jump(piece.near) : Vec2(Vec2::Zero());
-        const Vec2 across = left_of(line.direction_near(at_end, line.behind(at_end, 0.5 * (piece.near + piece.far))));
+        const Vec2 across = turn * left_of(line.direction_near(at_end, middle));
         const Vec2 force = piece.force - std::max(0.0, piece.force.dot(across)) * across;
         sum += force.dot(at_near - jump(piece.far)) / (piece.far - piece.near) * size;
     }
@@ -535,15 +536,16 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     load.toughness = wood.toughness;
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
-    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, body.layout.thickness);
-    load.opening = opening_in_own_frame(body, cracks, crack, at_end, state.displacement, options.rotates);
+    const Mat2 turn = options.rotates ? turn_about(body, tip, state.displacement) : Mat2(Mat2::Identity());
+    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, turn, body.layout.thickness);
+    load.opening = turn.transpose() * opening_behind(body, cracks, crack, at_end, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, cracks, line, at_end, field, anywhere, state, pieces, options.rotates);
     // Faces that press on each other behind the tip leave no mode I. Near mode II the grid lets those of the tip's own cell press
     // where the crack is open.
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
-        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(left_of(tip.direction)) > 0.0;
+        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
     });
     load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];

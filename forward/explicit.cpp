@@ -33,6 +33,7 @@ ExplicitSolver::ExplicitSolver(const Scene& scene, const Plan& plan, const Mater
     tips_.resize(2 * cracks_.lines.size());
     mass_ = field_masses(body, cracks_.fields());
     ties_.take_in(cracks_, mass_, displacement_, true);
+    normals_.take_in(body, cracks_, plan.rotates);
     if (BridgedFaces::are_in(scene)) bridges_.emplace(scene, body, cracks_, mass_, plan.added_frequency_squared);
     for (const Boundary::Held& h : boundary_.held) {
         velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
@@ -65,8 +66,9 @@ void ExplicitSolver::step() {
     std::fill(reaction_.begin(), reaction_.end(), Vec2::Zero());
     inner_forces(time_ + (0.5 - lag()) * plan_.time_step);
     surface_forces();
-    if (bridges_) bridges_->pull(cracks_, displacement_, force_);
-    ties_.settle(cracks_, mass_, force_);
+    normals_.turn(displacement_);
+    if (bridges_) bridges_->pull(cracks_, normals_, displacement_, force_);
+    ties_.settle(cracks_, normals_, mass_, force_);
     ties_.pull(cracks_, displacement_, force_);
     advance_velocities();
     struck_ = 0.0;
@@ -146,16 +148,17 @@ void ExplicitSolver::close_crack_faces(bool with_force) {
         const double m_left = mass_[pair.left];
         const double m_right = mass_[pair.right];
         if (m_left == 0.0 || m_right == 0.0) continue;
+        const Vec2& normal = normals_[k];
         const Vec2 gap = displacement_[pair.left] - displacement_[pair.right];
         const Vec2 rate = velocity_[pair.left] - velocity_[pair.right];
-        const double open = gap.dot(pair.normal);
+        const double open = gap.dot(normal);
         const double slowest = -std::max(open, 0.0) / dt;  // closes just now, no further
-        const double too_fast = slowest - rate.dot(pair.normal);
+        const double too_fast = slowest - rate.dot(normal);
         if (too_fast <= 0.0) continue;
-        Vec2 change = too_fast * pair.normal;
+        Vec2 change = too_fast * normal;
         const double total = m_left + m_right;
         const CrackFaces& faces = scene_.cracks[pair.crack].faces;
-        const Vec2 along = left_of(pair.normal);
+        const Vec2 along = left_of(normal);
         if (faces.kind == CrackFaces::Kind::stick) change -= rate.dot(along) * along;
         if (faces.coefficient > 0.0) {  // Coulomb's law of impulses
             const double most = faces.coefficient * too_fast;
@@ -206,7 +209,7 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     EnergyReleaseOptions options;
     options.rotates = options.sizes_K_by_J = plan_.rotates;
     std::vector<Vec2> faces = face_force_;
-    if (bridges_) bridges_->add_to(faces, cracks_);
+    if (bridges_) bridges_->add_to(faces, normals_);
     TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, faces}, options);
     if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
     return load;
@@ -228,7 +231,7 @@ EnergyBooks ExplicitSolver::energies() const {
     books.strain = internal_force_.energy(there) + ties_.energy(cracks_, there);
     books.kinetic = kinetic_energy();
     if (bridges_) {
-        const BridgedFaces::Energies faces = bridges_->energies(cracks_, there);
+        const BridgedFaces::Energies faces = bridges_->energies(cracks_, normals_, there);
         books.strain += faces.stored;
         books.fracture += faces.dissipated;
     }

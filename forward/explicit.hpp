@@ -4,6 +4,7 @@
 #include "forward/bridging.hpp"
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
+#include "forward/face_normals.hpp"
 #include "forward/fine_tip.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/part_contact.hpp"
@@ -118,6 +119,7 @@ class ExplicitSolver {
     InternalForce internal_force_;
     mutable Team team_;
     TipTies ties_;
+    FaceNormals normals_;
     std::optional<BridgedFaces> bridges_;
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;

@@ -119,6 +119,8 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     internal_force_.sort_cells();
     if (bridges_) softness *= bridges_->softer_ties(cracks_, softness);
     ties_.take_in(cracks_, mass_, displacement_, false, softness);
+    normals_.take_in(body_, cracks_, plan_.rotates);
+    normals_.turn(displacement_);
 }
 
 }  // namespace crampfit

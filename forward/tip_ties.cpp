@@ -81,7 +81,8 @@ void TipTies::take_in(const CrackFields& cracks, const std::vector<double>& mass
     std::ranges::sort(live_);
 }
 
-void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force) {
+void TipTies::settle(const CrackFields& cracks, const FaceNormals& normals, const std::vector<double>& mass,
+                     const std::vector<Vec2>& force) {
     for (const std::size_t k : live_) {
         Tie& tie = ties_[k];
         if (!tie.waits) continue;
@@ -89,7 +90,7 @@ void TipTies::settle(const CrackFields& cracks, const std::vector<double>& mass,
         const double left = mass[pair.left];
         const double right = mass[pair.right];
         Vec2 hold = (right * force[pair.left] - left * force[pair.right]) / (left + right);  // both sides go on alike
-        hold -= std::min(0.0, hold.dot(pair.normal)) * pair.normal;                          // pressure is left to the faces
+        hold -= std::min(0.0, hold.dot(normals[k])) * normals[k];                            // pressure is left to the faces
         tie.stretch = tie.slack * tie.compliance * hold - tie.begun_at;
         tie.held = 0.5 * tie.slack * tie.compliance * hold.squaredNorm();
         tie.waits = false;

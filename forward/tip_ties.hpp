@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/cracks.hpp"
+#include "forward/face_normals.hpp"
 #include "forward/tip_patch.hpp"
 
 #include <functional>
@@ -35,7 +35,8 @@ class TipTies {
                  double softness = 1.0);
 
     /// Lets the ties that are new hold their pairs together under these forces of the fields [N].
-    void settle(const CrackFields& cracks, const std::vector<double>& mass, const std::vector<Vec2>& force);
+    void settle(const CrackFields& cracks, const FaceNormals& normals, const std::vector<double>& mass,
+                const std::vector<Vec2>& force);
 
     /// Adds the ties' forces to those of the fields [N].
     void pull(const CrackFields& cracks, const std::vector<Vec2>& displacement, std::vector<Vec2>& force);

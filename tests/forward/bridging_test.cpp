@@ -108,7 +108,9 @@ TEST(VerificationBridging, FacesOfASlantedCrackAddUp) {
         BridgedFaces faces(scene, run.body, run.solver.cracks(), mass, 1e15);
         std::vector<Vec2> moved(mass.size(), Vec2::Zero()), force(mass.size(), Vec2::Zero());
         for (const FieldPair& pair : run.solver.cracks().pairs) moved[pair.left] = 20e-6 * pair.normal;
-        faces.pull(run.solver.cracks(), moved, force);
+        FaceNormals normals;
+        normals.take_in(run.body, run.solver.cracks(), false);
+        faces.pull(run.solver.cracks(), normals, moved, force);
         Vec2 left = Vec2::Zero();
         for (const FieldPair& pair : run.solver.cracks().pairs) left += force[pair.left];
         const double length = run.solver.cracks().lines[0].length, wanted = fibres.stress * 0.8 * length;

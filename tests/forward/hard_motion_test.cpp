@@ -82,6 +82,62 @@ TEST(HardTurning, ByNinetyDegreesAndByTenTurns) {
     }
 }
 
+// A square with a crack that is thrown together and sheared, so that its faces press, rub and part again; all of it turned by an
+// angle to begin with.
+std::vector<Vec2> clash(const CrackFaces& faces, double angle, Growth grows) {
+    Scene scene = loose_square(0.5e-3);
+    Crack crack;
+    crack.points = {Vec2(0.0, 5.1e-3), Vec2(6.2e-3, 5.4e-3)};
+    crack.grows = grows;
+    crack.direction = GrowthDirection::normal_to_opening;
+    crack.faces = faces;
+    scene.cracks = {crack};
+    Motion run(scene, true);
+    const Mat2 turn{{std::cos(angle), -std::sin(angle)}, {std::sin(angle), std::cos(angle)}};
+    const Vec2 middle(5e-3, 5e-3);
+    run.solver->start([&](const Vec2& x) { return Vec2(turn * (x - middle) - (x - middle)); },
+                      [&](const Vec2& x) {
+                          const double up = x.y() > 5.1e-3 + 0.3 / 6.2 * x.x() ? 1.0 : -1.0;
+                          return Vec2(turn * Vec2(6.0 * up, -8.0 * up));
+                      });
+    for (int k = 0; k < 400; ++k) {
+        run.solver->grow_cracks();
+        run.steps(1);
+    }
+    std::vector<Vec2> place;
+    for (int p = 0; p < run.body.points.count(); ++p)
+        place.push_back(turn.transpose() *
+                        (run.body.points.position[p] + value_at(run.body, p, run.solver->displacements()) - middle));
+    return place;
+}
+
+TEST(HardTurning, CracksThatCloseInATurnedSpecimen) {
+    CrackFaces smooth, rough, sticking, bridged;
+    rough.kind = CrackFaces::Kind::friction;
+    rough.coefficient = 0.4;
+    sticking.kind = CrackFaces::Kind::stick;
+    bridged.bridging = Bridging{.stress = 0.1e6, .opening = 0.1e-3, .on_all_faces = true};
+    const struct {
+        const char* name;
+        CrackFaces faces;
+        Growth grows;
+    } cases[] = {{"smooth", smooth, Growth::none},
+                 {"rough", rough, Growth::none},
+                 {"sticking", sticking, Growth::none},
+                 {"bridged", bridged, Growth::none},
+                 {"smooth, growing", smooth, Growth::end}};
+    for (const auto& [name, faces, grows] : cases) {
+        const std::vector<Vec2> upright = clash(faces, 0.0, grows);
+        for (const double angle : {30.0, 90.0, 135.0, 180.0}) {
+            const std::vector<Vec2> turned = clash(faces, angle * pi / 180, grows);
+            double most = 0.0;
+            for (std::size_t p = 0; p < turned.size(); ++p) most = std::max(most, (turned[p] - upright[p]).norm());
+            hard_case(fmt::format("crack with {} faces that close, turned by {:.0f} degrees", name, angle),
+                      "places over the side, off those of the upright square's", most / 10e-3, 1e-9);
+        }
+    }
+}
+
 TEST(SlowHardRest, MillionStepsUnderLoad) {
     // Under a pull that has long been taken up: neither creep nor drift.
     Scene scene = loose_square(2.5e-3);
