@@ -84,7 +84,7 @@ TEST(HardTurning, ByNinetyDegreesAndByTenTurns) {
 
 // A square with a crack that is thrown together and sheared, so that its faces press, rub and part again; all of it turned by an
 // angle to begin with.
-std::vector<Vec2> clash(const CrackFaces& faces, double angle, Growth grows) {
+std::vector<Vec2> clash(const CrackFaces& faces, double angle, int steps, Growth grows) {
     Scene scene = loose_square(0.5e-3);
     Crack crack;
     crack.points = {Vec2(0.0, 5.1e-3), Vec2(6.2e-3, 5.4e-3)};
@@ -100,7 +100,7 @@ std::vector<Vec2> clash(const CrackFaces& faces, double angle, Growth grows) {
                           const double up = x.y() > 5.1e-3 + 0.3 / 6.2 * x.x() ? 1.0 : -1.0;
                           return Vec2(turn * Vec2(6.0 * up, -8.0 * up));
                       });
-    for (int k = 0; k < 400; ++k) {
+    for (int k = 0; k < steps; ++k) {
         run.solver->grow_cracks();
         run.steps(1);
     }
@@ -120,20 +120,22 @@ TEST(HardTurning, CracksThatCloseInATurnedSpecimen) {
     const struct {
         const char* name;
         CrackFaces faces;
-        Growth grows;
-    } cases[] = {{"smooth", smooth, Growth::none},
-                 {"rough", rough, Growth::none},
-                 {"sticking", sticking, Growth::none},
-                 {"bridged", bridged, Growth::none},
-                 {"smooth, growing", smooth, Growth::end}};
-    for (const auto& [name, faces, grows] : cases) {
-        const std::vector<Vec2> upright = clash(faces, 0.0, grows);
+        int steps = 400;
+        Growth grows = Growth::none;
+    } cases[] = {{"smooth", smooth},
+                 {"rough", rough},
+                 {"sticking", sticking},
+                 {"bridged", bridged},
+                 {"smooth", smooth, 200, Growth::end}};  // later it runs out, with a snap that makes much of rounding
+    for (const auto& [name, faces, steps, grows] : cases) {
+        const std::vector<Vec2> upright = clash(faces, 0.0, steps, grows);
         for (const double angle : {30.0, 90.0, 135.0, 180.0}) {
-            const std::vector<Vec2> turned = clash(faces, angle * pi / 180, grows);
+            const std::vector<Vec2> turned = clash(faces, angle * pi / 180, steps, grows);
             double most = 0.0;
             for (std::size_t p = 0; p < turned.size(); ++p) most = std::max(most, (turned[p] - upright[p]).norm());
-            hard_case(fmt::format("crack with {} faces that close, turned by {:.0f} degrees", name, angle),
-                      "places over the side, off those of the upright square's", most / 10e-3, 1e-9);
+            hard_case(fmt::format("{} crack with {} faces that close, at {:.0f} degrees",
+                                  grows == Growth::none ? "standing" : "growing", name, angle),
+                      "places over the side, off those of the square upright", most / 10e-3, 1e-9);
         }
     }
 }
