@@ -249,35 +249,6 @@ Vec2 mean_velocity(const Discretisation& body, const Vec2& tip, const Extension&
     return mass > 0.0 ? Vec2(sum / mass) : sum;
 }
 
-ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal,
-                                bool rotates) {
-    const Points& points = body.points;
-    const Vec2 as_a_whole = mean_velocity(body, tip, extension, nodal);
-    double sum = 0.0;
-    double change_along = 0.0, change = 0.0;  // explicit gradients of the energy [J/m]
-    for_points_in(body, tip, extension, [&](const Spot& spot, const Vec2& q, const Mat2& q_gradient) {
-        const int p = spot.point;
-        const Mat2 u_gradient = spot.seen_gradient(body, nodal.displacement, rotates);
-        const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
-        const Vec2 v = spot.value(body, nodal.velocity) - as_a_whole;
-        const Vec2 a = spot.value(body, nodal.acceleration);
-        const Mat2 v_gradient = spot.gradient(body, nodal.velocity);
-        const double density = points.density(p);
-        double integrand = (state.stress.transpose() * u_gradient).cwiseProduct(q_gradient.transpose()).sum() -
-                           (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
-                           density * (a.dot(u_gradient * q) - v.dot(v_gradient * q));
-        if (!points.changes.empty() && points.changes[p] != Change::none) {
-            const WoodGradient wood(body, p);
-            const Vec2 gradient = wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density;
-            integrand -= gradient.dot(q);
-            change_along += std::abs(gradient.dot(q)) * spot.volume;
-            change += gradient.norm() * q.norm() * spot.volume;
-        }
-        sum += integrand * spot.volume;
-    });
-    return {sum / body.layout.thickness, change_along < little_change * change};
-}
-
 // How the wood around the tip has turned as a whole.
 Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal) {
     Mat2 sum = Mat2::Zero();
@@ -288,6 +259,39 @@ Mat2 mean_turn(const Discretisation& body, const Vec2& tip, const Extension& ext
         ++count;
     });
     return Polar(sum / count).turn;
+}
+
+ReleaseRate energy_release_rate(const Discretisation& body, const Vec2& tip, const Extension& extension, const NodalState& nodal,
+                                bool rotates) {
+    const Points& points = body.points;
+    const Vec2 as_a_whole = mean_velocity(body, tip, extension, nodal);
+    // Nor must how it has turned: by the balance of momentum that part of the integral is nil, but not on a grid.
+    Mat2 turn_as_a_whole = Mat2::Zero();
+    if (rotates) turn_as_a_whole = mean_turn(body, tip, extension, nodal) - Mat2::Identity();
+    double sum = 0.0;
+    double change_along = 0.0, change = 0.0;  // explicit gradients of the energy [J/m]
+    for_points_in(body, tip, extension, [&](const Spot& spot, const Vec2& q, const Mat2& q_gradient) {
+        const int p = spot.point;
+        const Mat2 u_gradient = spot.seen_gradient(body, nodal.displacement, rotates);
+        const PointState state = elastic_state(u_gradient, points.stiffness_of(p), rotates);
+        const Mat2 own_gradient = u_gradient - turn_as_a_whole;
+        const Vec2 v = spot.value(body, nodal.velocity) - as_a_whole;
+        const Vec2 a = spot.value(body, nodal.acceleration);
+        const Mat2 v_gradient = spot.gradient(body, nodal.velocity);
+        const double density = points.density(p);
+        double integrand = (state.stress.transpose() * own_gradient).cwiseProduct(q_gradient.transpose()).sum() -
+                           (state.energy + 0.5 * density * v.squaredNorm()) * q_gradient.trace() +
+                           density * (a.dot(own_gradient * q) - v.dot(v_gradient * q));
+        if (!points.changes.empty() && points.changes[p] != Change::none) {
+            const WoodGradient wood(body, p);
+            const Vec2 gradient = wood.of_energy(state) + 0.5 * v.squaredNorm() * wood.density;
+            integrand -= gradient.dot(q);
+            change_along += std::abs(gradient.dot(q)) * spot.volume;
+            change += gradient.norm() * q.norm() * spot.volume;
+        }
+        sum += integrand * spot.volume;
+    });
+    return {sum / body.layout.thickness, change_along < little_change * change};
 }
 
 // What the tractions on faces take of that: - int t_i [u_i],k q_k ds. Along a piece [u],k q_k is taken for even, with q in the
@@ -537,7 +541,8 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
     const Mat2 turn = options.rotates ? turn_about(body, tip, state.displacement) : Mat2(Mat2::Identity());
-    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, turn, body.layout.thickness);
+    const Mat2 face_turn = options.faces_turn ? turn : Mat2(Mat2::Identity());
+    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, face_turn, body.layout.thickness);
     load.opening = turn.transpose() * opening_behind(body, cracks, crack, at_end, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
@@ -545,7 +550,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     // Faces that press on each other behind the tip leave no mode I. Near mode II the grid lets those of the tip's own cell press
     // where the crack is open.
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
-        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
+        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(face_turn * left_of(tip.direction)) > 0.0;
     });
     load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];

@@ -44,6 +44,7 @@ struct EnergyReleaseOptions {
     double least_outer = 3.0;  // in other wood
     double least_outer_at_cracks = 2.0;
     bool rotates = false;
+    bool faces_turn = false;    // what presses and pulls on crack faces does so along normals that turn with the wood
     bool sizes_K_by_J = false;  // in finite rotation, of a state that is in balance
 };
 
@@ -54,10 +55,11 @@ struct EnergyReleaseOptions {
 ///         - int t_i [u_i],k q_k ds,
 /// W and T the strain and kinetic energy densities, P the first Piola-Kirchhoff stress, t the traction on the left one of faces
 /// that touch or are bridged and [u] the jump from right to left: what friction and bridges take of the energy does not reach the
-/// tip. K_I and K_II come from the interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left,
-/// seen toward the tip, ahead, and turns a crack clockwise. At small strain (K_I^2 + K_II^2) / E' = G is not imposed: both ways
-/// to G agree within the discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are
-/// near (`tips_test`). In finite rotation K may be given the size that G asks for.
+/// tip. In finite rotation u_i,k is what is left without the turn of the wood about the tip. K_I and K_II come from the
+/// interaction integral over the same domain. K_I opens; K_II > 0 moves the face on the left, seen toward the tip, ahead, and
+/// turns a crack clockwise. At small strain (K_I^2 + K_II^2) / E' = G is not imposed: both ways to G agree within the
+/// discretisation error, K's is the smaller one where the crack is oblique to the grid or boundaries are near (`tips_test`). In
+/// finite rotation K may be given the size that G asks for.
 TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
                  const NodalState& state, const EnergyReleaseOptions& options);
 

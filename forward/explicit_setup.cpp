@@ -55,6 +55,7 @@ void ExplicitSolver::start(const std::function<Vec2(const Vec2&)>& displacement,
         velocity_[f] = velocity(x);
     }
     for (const Boundary::Held& h : boundary_.held) velocity_[h.field][h.axis] = boundary_.velocity_of(h.driver)[h.axis];
+    normals_.turn(displacement_);
     std::fill(force_.begin(), force_.end(), Vec2::Zero());
     inner_forces(0.0);
     carried_ = velocity_;
