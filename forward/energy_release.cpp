@@ -541,8 +541,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const ReleaseRate J = energy_release_rate(body, tip.position, extension, state, options.rotates);
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
     const Mat2 turn = options.rotates ? turn_about(body, tip, state.displacement) : Mat2(Mat2::Identity());
-    const Mat2 face_turn = options.faces_turn ? turn : Mat2(Mat2::Identity());
-    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, face_turn, body.layout.thickness);
+    load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, turn, body.layout.thickness);
     load.opening = turn.transpose() * opening_behind(body, cracks, crack, at_end, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
@@ -550,7 +549,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     // Faces that press on each other behind the tip leave no mode I. Near mode II the grid lets those of the tip's own cell press
     // where the crack is open.
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
-        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(face_turn * left_of(tip.direction)) > 0.0;
+        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
     });
     load.K_I = press ? 0.0 : std::max(0.0, K[0]);
     load.K_II = K[1];

@@ -44,7 +44,6 @@ struct EnergyReleaseOptions {
     double least_outer = 3.0;  // in other wood
     double least_outer_at_cracks = 2.0;
     bool rotates = false;
-    bool faces_turn = false;    // what presses and pulls on crack faces does so along normals that turn with the wood
     bool sizes_K_by_J = false;  // in finite rotation, of a state that is in balance
 };
 

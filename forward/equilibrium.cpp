@@ -81,6 +81,7 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
 void Equilibrium::renumber() {
     const int fields = cracks_.fields();
     mass_ = field_masses(body_, fields);
+    normals_.take_in(body_, cracks_, plan_.rotates);
     equation_.assign(2 * fields, 0);
     free_of_dof_.assign(2 * fields, -1);
     for (const Boundary::Held& held : boundary_.held) {
@@ -165,11 +166,10 @@ double Equilibrium::tie_of(const FieldPair& pair) const {
     return 0.5 * (kept(pair.left) + kept(pair.right)) * shared_tie(pair, mass_);
 }
 
-Mat2 Equilibrium::pair_stiffness(const FieldPair& pair) const { return tie_of(pair) * Mat2::Identity() + face_stiffness(pair); }
-
 // Forces out of balance, reactions, and the energies that are not the points'.
 void Equilibrium::find_forces() {
     potential_.reset();
+    normals_.turn(displacement_);
     force_.assign(displacement_.size(), Vec2::Zero());
     reaction_.assign(boundary_.drivers(), Vec2::Zero());
     do_side_by_side(side_by_side_, sliding_.size() + 1, [&](std::size_t k) {
@@ -179,13 +179,14 @@ void Equilibrium::find_forces() {
     face_energy_ = face_dissipated_;
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
-        if (mass_[pair.left] == 0.0 || mass_[pair.right] == 0.0) continue;
-        const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
-        const Drag drag = face_drag(k);
-        const Vec2 pull = pair_stiffness(pair) * jump - drag.force;
+        if (!is_whole(pair)) continue;
+        const Vec2 pull = tie_of(pair) * (displacement_[pair.left] - displacement_[pair.right]);
         force_[pair.left] -= pull;
         force_[pair.right] += pull;
-        face_energy_ += 0.5 * jump.dot(face_stiffness(pair) * jump) + drag.energy + drag.dissipated;
+        const Drag drag = face_drag(k);
+        const Vec2 place = apart(k, displacement_);
+        push_faces(k, drag.force - face_stiffness(k) * place, [&](int field, const Vec2& push) { force_[field] += push; });
+        face_energy_ += 0.5 * place.dot(face_stiffness(k) * place) + drag.energy + drag.dissipated;
     }
     for (const Boundary::Traction& t : boundary_.tractions) {
         for (int k = 0; k < 4; ++k) force_[t.field[k]] += t.facet.weight[k] * t.force;
@@ -274,25 +275,29 @@ int Equilibrium::cell_at(int node) const {
                              std::min(node / (layout.cells_x + 1), layout.cells_y - 1));
 }
 
-void Equilibrium::add_pairs() {
+void Equilibrium::add_pairs(bool geometric) {
     pair_stiffness_.resize(cracks_.pairs.size(), Mat2::Zero());
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
         const FieldPair& pair = cracks_.pairs[k];
         const int cell = cell_at(pair.node);
-        Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
+        Mat2 held = Mat2::Zero(), remainder = Mat2::Zero();  // in the frame of the faces
+        if (is_whole(pair)) held = face_stiffness(k);
         if (joins_faces_ && rubs(pair)) {
-            stiffness = (tie_of(pair) + joint * closed_stiffness(pair)) * Mat2::Identity();
+            held = joint * closed_stiffness(pair) * Mat2::Identity();
         } else if (const Drag drag = face_drag(k); drag.limit > 0.0) {
             const Vec2 along = left_of(pair.normal);
-            const Mat2 symmetric = drag.stiffness * along * along.transpose();
-            stiffness += symmetric;
-            add_rubbing(std::array{pair.left, pair.right, -1, -1}, std::array{1.0, -1.0, 0.0, 0.0}, -1, drag.tangent - symmetric);
+            remainder = drag.tangent - drag.stiffness * along * along.transpose();
+            held += drag.stiffness * along * along.transpose();
         }
+        const Mat2 turn = turn_of(k);
+        Mat2 stiffness = turn * held * turn.transpose();
+        if (is_whole(pair)) stiffness += tie_of(pair) * Mat2::Identity();
         if (std::exchange(pair_stiffness_[k], stiffness) != stiffness) factor_.mark(cell);
         if (stiffness.isZero(0.0)) continue;
         Eigen::Matrix<double, 8, 8> both = Eigen::Matrix<double, 8, 8>::Zero();
         both.topLeftCorner<4, 4>() << stiffness, -stiffness, -stiffness, stiffness;
         add_extra(cell, std::array{pair.left, pair.right, -1, -1}, both);
+        if (!held.isZero(0.0)) add_turning(k, held, remainder, geometric);
     }
 }
 
@@ -363,7 +368,7 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     lessons_.clear();
     add_lone_points();
     add_slivers(geometric);
-    add_pairs();
+    add_pairs(geometric);
     add_edge_ties();
     add_hinges();
     add_touches(geometric);
@@ -656,7 +661,7 @@ bool Equilibrium::relax(const std::vector<Vec2>& displacement) {
     const auto look_at_faces = [&] {
         bool same = true;
         for (std::size_t k = 0; k < closed.size(); ++k) {
-            const char now = is_closed(cracks_.pairs[k]);
+            const char now = is_closed(k);
             same = std::exchange(closed[k], now) == now && same;
         }
         return same;

@@ -3,6 +3,7 @@
 #include "forward/boundary.hpp"
 #include "forward/contact.hpp"
 #include "forward/energy_release.hpp"
+#include "forward/face_normals.hpp"
 #include "forward/grid_factor.hpp"
 #include "forward/internal_force.hpp"
 #include "forward/loose_pieces.hpp"
@@ -19,10 +20,11 @@ namespace crampfit {
 
 /// Static equilibrium of points, grid, crack fields and bodies for given crack tips: the displacement that makes the potential
 ///     Pi(u) = sum of V W(grad u) + ties at the tips + closed crack faces + contact - work of the tractions and forces on bodies
-/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. Where bodies or
-/// closed crack faces rub, the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi
-/// holds what friction has dissipated, so that its change is still the work of what prescribes motion. So it is with wood that
-/// remembers: an increment takes its history along, and Pi holds what it has dissipated.
+/// stationary under what the boundary prescribes at a time, by Newton's method with the consistent tangent. In finite rotation
+/// crack faces press along normals that turn with the wood about them (`FaceNormals`). Where bodies or closed crack faces rub,
+/// the forces are those of Coulomb's law from the equilibrium found before on (an increment), and Pi holds what friction has
+/// dissipated, so that its change is still the work of what prescribes motion. So it is with wood that remembers: an increment
+/// takes its history along, and Pi holds what it has dissipated.
 ///
 /// A free component of a body's motion is one more unknown, which borders the equations of the grid.
 class Equilibrium {
@@ -158,14 +160,15 @@ class Equilibrium {
     void add_lone_points();
     void add_slivers(bool geometric);
     int cell_at(int node) const;
-    void add_pairs();
+    void add_pairs(bool geometric);
+    void add_turning(std::size_t pair, const Mat2& held, const Mat2& remainder, bool geometric);
     void add_edge_ties();
     void add_touches(bool geometric);
     void couple(std::span<const int> rows, std::span<const double> steps, const Eigen::Ref<const Eigen::MatrixXd>& stiffness);
     void add_touch(const SlidingBody& body, int driver, const SlidingBody::Touch& touch, bool geometric);
     void let_yield(SlidingBody& body, const Vec2& travel);
     void add_yield(const SlidingBody& body, int driver, const std::vector<SlidingBody::Touch>& touches);
-    void add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder);
+    void add_rubbing(std::span<const int> rows, std::span<const double> steps, Eigen::MatrixXd remainder);
     bool take_in_spread();
     Eigen::VectorXd load_of(const std::vector<Vec2>& drivers);
     Motion motion_of(const std::vector<Vec2>& drivers, const Eigen::VectorXd& step) const;
@@ -174,10 +177,14 @@ class Equilibrium {
     double kept(int field) const { return field < static_cast<int>(kept_.size()) ? kept_[field] : 1.0; }
     double tie_of(const FieldPair& pair) const;
     double tie_of(const Boundary::Tied& tie) const { return kept(tie.field) * tie.stiffness; }
-    Mat2 pair_stiffness(const FieldPair& pair) const;
-    bool is_closed(const FieldPair& pair) const;
-    Mat2 face_stiffness(const FieldPair& pair) const;
-    bool slips(const FieldPair& pair) const;
+    bool is_whole(const FieldPair& pair) const { return mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0; }
+    Mat2 turn_of(std::size_t pair) const;
+    Vec2 apart(std::size_t pair, const std::vector<Vec2>& displacement) const;
+    template <class Add>
+    void push_faces(std::size_t pair, const Vec2& push, const Add& add) const;
+    bool is_closed(std::size_t pair) const;
+    Mat2 face_stiffness(std::size_t pair) const;
+    bool slips(std::size_t pair) const { return pair < slips_.size() && slips_[pair]; }
     bool let_slip(std::vector<char>& closed, std::vector<int>& changes);
     double closed_stiffness(const FieldPair& pair) const;
     Vec2 place_of(int driver) const { return boundary_.travel(driver, time_) + moved_[driver]; }  // how far it has come [m]
@@ -214,6 +221,7 @@ class Equilibrium {
     Discretisation& body_;
     const MaterialMap& materials_;
     CrackFields cracks_;
+    FaceNormals normals_;
     Boundary boundary_;
     Gauges gauges_;
     std::unique_ptr<History> history_;
@@ -281,14 +289,12 @@ class Equilibrium {
         std::vector<int> rows;      // equations
         Eigen::MatrixXd stiffness;  // that the cell does not hold [N/m]
     };
-    std::vector<Spread> spread_;  // of touches
+    std::vector<Spread> spread_;  // of touches, and of crack faces that press along normals that turn
 
     // Friction:
-    struct Rubbing {  // what the factor leaves out of the tangent at a place that rubs: it is not symmetric
-        std::vector<int> fields;
-        std::vector<double> weight;
-        int driver;      // of the body, or -1
-        Mat2 remainder;  // force on the fields less that on the body by their motion against it, with sign [N/m]
+    struct Rubbing {                // what the factor leaves out of the tangent at a place that rubs: it is not symmetric
+        std::vector<int> rows;      // equations, those of free bodies with them, or -1
+        Eigen::MatrixXd remainder;  // [N/m]
     };
     std::vector<Rubbing> rubbing_;
     std::vector<Vec2> settled_;            // displacement from which friction on crack faces counts; empty: no such faces

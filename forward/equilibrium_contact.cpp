@@ -27,22 +27,101 @@ constexpr double face_stiffness_factor = 100.0;
 // So often may faces that stick go between apart and pressed, from iteration to iteration, before they slide.
 constexpr int most_changes = 3;
 
+// Slopes of the angle by which wood has turned, by the displacement of a field: theta's own, and rho with d^2 theta = - (rho
+// dtheta + dtheta rho) [1/m].
+struct TurnSlope {
+    Vec2 angle, rho;
+    TurnSlope(const Polar& polar, const Vec2& slope) : rho(polar.turn * slope / polar.trace) { angle = left_of(rho); }
+};
+
 }  // namespace
 
-bool Equilibrium::is_closed(const FieldPair& pair) const {
-    return (displacement_[pair.left] - displacement_[pair.right]).dot(pair.normal) < 0.0;
+// Crack faces press and rub in a frame that turns with the wood about their pair of fields, by theta: there the left one stands
+// at j = R^T (u_left - u_right), so that dj = R^T d(u_left - u_right) - J j dtheta, J a quarter turn. What holds them so is a
+// force p by j; it joins the pair with all fields that turn the wood.
+
+// From the frame of a pair's faces.
+Mat2 Equilibrium::turn_of(std::size_t k) const {
+    return normals_.can_turn() ? normals_.polar(k, displacement_).turn : Mat2(Mat2::Identity());
 }
 
-Mat2 Equilibrium::face_stiffness(const FieldPair& pair) const {
-    if (!is_closed(pair) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
+// How far the left face stands from the right one, in the frame of the faces [m].
+Vec2 Equilibrium::apart(std::size_t k, const std::vector<Vec2>& displacement) const {
+    const FieldPair& pair = cracks_.pairs[k];
+    const Vec2 jump = displacement[pair.left] - displacement[pair.right];
+    return normals_.can_turn() ? Vec2(normals_.polar(k, displacement).turn.transpose() * jump) : jump;
+}
+
+// What a force on the left face, in the frame of the faces, puts on fields.
+template <class Add>
+void Equilibrium::push_faces(std::size_t k, const Vec2& push, const Add& add) const {
+    if (push.isZero(0.0)) return;
+    const FieldPair& pair = cracks_.pairs[k];
+    const Polar polar = normals_.polar(k, displacement_);
+    add(pair.left, polar.turn * push);
+    add(pair.right, -(polar.turn * push));
+    if (!normals_.can_turn()) return;
+    const double moment = -push.dot(left_of(apart(k, displacement_)));
+    for (const FaceNormals::Share& share : normals_.shares(k)) add(share.field, moment * TurnSlope(polar, share.slope).angle);
+}
+
+// What holds the faces of a pair in their frame, `held`, and what more friction does there, joins the fields that turn the wood
+// about it; that between its own fields along the turned normal is with the factor already.
+void Equilibrium::add_turning(std::size_t k, const Mat2& held, const Mat2& remainder, bool geometric) {
+    const FieldPair& pair = cracks_.pairs[k];
+    const auto shares = normals_.shares(k);
+    const bool alike = held == held(0, 0) * Mat2::Identity();  // such springs are the same in every frame
+    if (remainder.isZero(0.0) && (shares.empty() || alike)) return;
+    std::vector<int> fields{pair.left, pair.right};
+    for (const FaceNormals::Share& share : shares)
+        if (share.field != pair.left && share.field != pair.right) fields.push_back(share.field);
+    const auto size = static_cast<Eigen::Index>(2 * fields.size());
+    const Polar polar = normals_.polar(k, displacement_);
+    const Mat2& turn = polar.turn;
+    const Vec2 place = apart(k, displacement_);
+    Eigen::VectorXd angle = Eigen::VectorXd::Zero(size), rho = angle, aside = angle;
+    for (const FaceNormals::Share& share : shares) {
+        const auto at = 2 * (std::ranges::find(fields, share.field) - fields.begin());
+        const TurnSlope slope(polar, share.slope);
+        angle.segment<2>(at) = slope.angle;
+        rho.segment<2>(at) = slope.rho;
+    }
+    Eigen::MatrixXd apart_slope = -left_of(place) * angle.transpose();
+    apart_slope.leftCols<2>() += turn.transpose();
+    apart_slope.middleCols<2>(2) -= turn.transpose();
+    std::vector<int> rows(size), of_grid(size);
+    std::vector<double> steps(size);
+    for (Eigen::Index a = 0; a < size; ++a) {
+        const int dof = 2 * fields[a / 2] + static_cast<int>(a % 2);
+        rows[a] = row_of(dof);
+        of_grid[a] = equation_[dof];
+        steps[a] = prescribed_step_[dof];
+    }
+    if (!remainder.isZero(0.0)) add_rubbing(rows, steps, apart_slope.transpose() * remainder * apart_slope);
+    if (shares.empty()) return;
+    Eigen::MatrixXd stiffness = apart_slope.transpose() * held * apart_slope;
+    const Mat2 own = turn * held * turn.transpose();
+    stiffness.topLeftCorner<4, 4>() -= (Eigen::Matrix4d() << own, -own, -own, own).finished();
+    if (geometric && !joins_faces_) {
+        const Vec2 p = face_stiffness(k) * place - face_drag(k).force;
+        aside.head<2>() = turn * left_of(p);
+        aside.segment<2>(2) = -aside.head<2>();
+        aside += p.dot(left_of(place)) * rho - 0.5 * p.dot(place) * angle;
+        stiffness += aside * angle.transpose() + angle * aside.transpose();
+    }
+    couple(rows, steps, stiffness);
+    spread_.push_back({std::move(of_grid), std::move(stiffness)});
+}
+
+bool Equilibrium::is_closed(std::size_t k) const { return apart(k, displacement_).dot(cracks_.pairs[k].normal) < 0.0; }
+
+// In the frame of the faces.
+Mat2 Equilibrium::face_stiffness(std::size_t k) const {
+    const FieldPair& pair = cracks_.pairs[k];
+    if (!is_closed(k) || pieces_.is_loose(pair.left) || pieces_.is_loose(pair.right)) return Mat2::Zero();
     const double stiffness = closed_stiffness(pair);
-    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick && !slips(pair)) return stiffness * Mat2::Identity();
+    if (scene_.cracks[pair.crack].faces.kind == CrackFaces::Kind::stick && !slips(k)) return stiffness * Mat2::Identity();
     return stiffness * pair.normal * pair.normal.transpose();
-}
-
-bool Equilibrium::slips(const FieldPair& pair) const {
-    const auto number = static_cast<std::size_t>(&pair - cracks_.pairs.data());
-    return number < slips_.size() && slips_[number];
 }
 
 // Faces that stick and have slid past each other before they met may overlap while they are free and part as soon as they are
@@ -51,9 +130,8 @@ bool Equilibrium::slips(const FieldPair& pair) const {
 bool Equilibrium::let_slip(std::vector<char>& closed, std::vector<int>& changes) {
     bool some = false;
     for (std::size_t k = 0; k < closed.size(); ++k) {
-        const FieldPair& pair = cracks_.pairs[k];
-        if (scene_.cracks[pair.crack].faces.kind != CrackFaces::Kind::stick || slips_[k]) continue;
-        if (std::exchange(closed[k], is_closed(pair)) != closed[k] && ++changes[k] > most_changes) slips_[k] = some = true;
+        if (scene_.cracks[cracks_.pairs[k].crack].faces.kind != CrackFaces::Kind::stick || slips_[k]) continue;
+        if (std::exchange(closed[k], is_closed(k)) != closed[k] && ++changes[k] > most_changes) slips_[k] = some = true;
     }
     return some;
 }
@@ -153,19 +231,11 @@ Eigen::MatrixXd Equilibrium::bordered_step(const Eigen::MatrixXd& right) const {
 Eigen::VectorXd Equilibrium::remainder_of(const Eigen::VectorXd& step) const {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(step.size());
     for (const Rubbing& r : rubbing_) {
-        const std::size_t fields = r.fields.size();
-        const auto weight = [&](std::size_t a) { return a < fields ? r.weight[a] : -1.0; };
-        const auto row = [&](std::size_t a, int axis) {
-            return a == fields ? row_of_body(r.driver, axis) : r.fields[a] < 0 ? -1 : row_of(2 * r.fields[a] + axis);
-        };
-        Vec2 apart = Vec2::Zero();
-        for (std::size_t a = 0; a <= fields; ++a)
-            for (int axis = 0; axis < 2; ++axis)
-                if (const int at = row(a, axis); at >= 0) apart[axis] += weight(a) * step[at];
-        const Vec2 force = r.remainder * apart;
-        for (std::size_t a = 0; a <= fields; ++a)
-            for (int axis = 0; axis < 2; ++axis)
-                if (const int at = row(a, axis); at >= 0) sum[at] += weight(a) * force[axis];
+        Eigen::VectorXd moved(r.rows.size());
+        for (std::size_t a = 0; a < r.rows.size(); ++a) moved[a] = r.rows[a] < 0 ? 0.0 : step[r.rows[a]];
+        const Eigen::VectorXd force = r.remainder * moved;
+        for (std::size_t a = 0; a < r.rows.size(); ++a)
+            if (r.rows[a] >= 0) sum[r.rows[a]] += force[a];
     }
     return sum;
 }
@@ -177,20 +247,13 @@ Eigen::VectorXd Equilibrium::tangent_step(const Eigen::VectorXd& right) const {
         [&](const Eigen::VectorXd& x) { return remainder_of(x); });
 }
 
-void Equilibrium::add_rubbing(std::span<const int> fields, std::span<const double> weight, int driver, const Mat2& remainder) {
-    if (remainder.isZero(0.0)) return;
-    rubbing_.push_back({{fields.begin(), fields.end()}, {weight.begin(), weight.end()}, driver, remainder});
+// What friction at a place adds beyond the symmetric part that the factor holds.
+void Equilibrium::add_rubbing(std::span<const int> rows, std::span<const double> steps, Eigen::MatrixXd remainder) {
     // What is prescribed loads the others here too.
-    Vec2 apart = driver < 0 ? Vec2::Zero() : Vec2(-still_to_go_[driver]);
-    for (std::size_t a = 0; a < fields.size(); ++a)
-        for (int axis = 0; axis < 2 && fields[a] >= 0; ++axis) apart[axis] += weight[a] * prescribed_step_[2 * fields[a] + axis];
-    const Vec2 force = remainder * apart;
-    for (int axis = 0; axis < 2; ++axis) {
-        for (std::size_t a = 0; a < fields.size(); ++a)
-            if (const int row = fields[a] < 0 ? -1 : row_of(2 * fields[a] + axis); row >= 0)
-                step_load_[row] -= weight[a] * force[axis];
-        if (const int row = row_of_body(driver, axis); row >= 0) step_load_[row] += force[axis];
-    }
+    const Eigen::VectorXd force = remainder * Eigen::Map<const Eigen::VectorXd>(steps.data(), remainder.cols());
+    for (std::size_t a = 0; a < rows.size(); ++a)
+        if (rows[a] >= 0) step_load_[rows[a]] -= force[a];
+    rubbing_.push_back({{rows.begin(), rows.end()}, std::move(remainder)});
 }
 
 // A spring between a body and what holds a facet.
@@ -213,23 +276,29 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
     const Mat2 along = Mat2::Identity() - normal;
     const double turning = geometric ? touch.force * touch.curvature : 0.0;
     const Mat2 stiffness = touch.stiffness * normal + (touch.drag.stiffness - turning) * along;
-    if (touch.drag.limit > 0.0) add_rubbing(fields, weight, driver, touch.drag.tangent - touch.drag.stiffness * along);
 
     // The other end of the spring is the body.
     const std::size_t size = 2 * fields.size();
     std::vector<int> rows(size + 2);
     std::vector<double> steps(size + 2);
-    Eigen::MatrixXd tangent(size + 2, size + 2);
+    const auto spread = [&](const Mat2& by_place) {
+        Eigen::MatrixXd all(size + 2, size + 2);
+        for (std::size_t a = 0; a < weight.size(); ++a)
+            for (std::size_t b = 0; b < weight.size(); ++b) all.block<2, 2>(2 * a, 2 * b) = weight[a] * weight[b] * by_place;
+        return all;
+    };
     weight.push_back(-1.0);
-    for (std::size_t a = 0; a < weight.size(); ++a) {
-        for (std::size_t b = 0; b < weight.size(); ++b) tangent.block<2, 2>(2 * a, 2 * b) = weight[a] * weight[b] * stiffness;
+    for (std::size_t a = 0; a < weight.size(); ++a)
         for (std::size_t axis = 0; axis < 2; ++axis) {
             const int dof = a < fields.size() ? 2 * fields[a] + static_cast<int>(axis) : -1;
             rows[2 * a + axis] = dof < 0 ? row_of_body(driver, static_cast<int>(axis)) : row_of(dof);
             steps[2 * a + axis] = dof < 0 ? still_to_go_[driver][axis] : prescribed_step_[dof];
         }
-    }
+    Eigen::MatrixXd tangent = spread(stiffness);
     couple(rows, steps, tangent);
+    if (const Mat2 remainder = touch.drag.tangent - touch.drag.stiffness * along;
+        touch.drag.limit > 0.0 && !remainder.isZero(0.0))
+        add_rubbing(rows, steps, spread(remainder));
 
     // The factor takes up what joins the fields of one cell: all, or the same spring on the facet's own.
     const Facet& facet = body_.facets[touch.facet];
@@ -327,18 +396,18 @@ bool Equilibrium::rubs(const FieldPair& pair) const {
     return scene_.cracks[pair.crack].faces.coefficient > 0.0 && mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0;
 }
 
-// Friction between the faces of a pair, on the left one.
+// Friction between the faces of a pair, on the left one, in their frame.
 Drag Equilibrium::face_drag(std::size_t k) const {
     const FieldPair& pair = cracks_.pairs[k];
     if (!rubs(pair)) return {};
     const double friction = scene_.cracks[pair.crack].faces.coefficient;
-    const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
-    const Vec2 before = settled_[pair.left] - settled_[pair.right];
-    const double stiffness = pair.normal.dot(face_stiffness(pair) * pair.normal);
+    const Vec2 place = apart(k, displacement_);
+    const Vec2 before = apart(k, settled_);
+    const double stiffness = pair.normal.dot(face_stiffness(k) * pair.normal);
     if (stiffness == 0.0) return {};
-    const double depth = -jump.dot(pair.normal);
+    const double depth = -place.dot(pair.normal);
     const double depth_before = std::min(0.0, -before.dot(pair.normal));
-    const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, depth_before, jump - before};
+    const Pressing pressing{pair.normal, 0.0, stiffness * depth, stiffness, depth, depth_before, place - before};
     return drag(pressing, friction, stiffness, k < face_grips_.size() ? face_grips_[k] : Grip{});
 }
 
@@ -354,9 +423,9 @@ bool Equilibrium::sort_out_faces() {
         const double stretch = k < face_grips_.size() ? face_grips_[k].stretch : 0.0;
         pairs.push_back(static_cast<int>(k));
         const double stiffness = closed_stiffness(pair);
-        places.push_back({pair.normal, stiffness, scene_.cracks[pair.crack].faces.coefficient,
-                          displacement_[pair.left] - displacement_[pair.right], settled_[pair.left] - settled_[pair.right],
-                          stretch, joint * stiffness});
+        places.push_back({normals_[k], stiffness, scene_.cracks[pair.crack].faces.coefficient,
+                          displacement_[pair.left] - displacement_[pair.right], turn_of(k) * apart(k, settled_), stretch,
+                          joint * stiffness});
     }
     joins_faces_ = true;
     const bool made = factor_tangent(true) || factor_tangent(false);
@@ -384,10 +453,9 @@ bool Equilibrium::sort_out_faces() {
 std::vector<Vec2> Equilibrium::face_forces() const {
     std::vector<Vec2> forces;
     for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
-        const FieldPair& pair = cracks_.pairs[k];
-        const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
-        const bool both = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0;
-        forces.push_back(both ? Vec2(face_drag(k).force - face_stiffness(pair) * jump) : Vec2(Vec2::Zero()));
+        const bool both = is_whole(cracks_.pairs[k]);
+        const Vec2 place = apart(k, displacement_);
+        forces.push_back(both ? Vec2(turn_of(k) * (face_drag(k).force - face_stiffness(k) * place)) : Vec2(Vec2::Zero()));
     }
     return forces;
 }

@@ -23,7 +23,7 @@ Eigen::VectorXd Equilibrium::load_of(const std::vector<Vec2>& drivers) {
     extra_.clear();
     couple_points(true);
     add_lone_points();
-    add_pairs();
+    add_pairs(true);
     add_edge_ties();
     add_touches(true);
     spread_.clear();
@@ -104,17 +104,21 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         slope.fields.col(n) = -Eigen::Map<const Eigen::VectorXd>(of_points.data()->data(), slope.fields.rows());
     }
     // Ties and closed faces are as stiff as their wood.
-    for (const FieldPair& pair : cracks_.pairs) {
-        const Mat2 stiffness = mass_[pair.left] > 0.0 && mass_[pair.right] > 0.0 ? pair_stiffness(pair) : Mat2::Zero();
-        if (stiffness.isZero(0.0)) continue;
+    for (std::size_t k = 0; k < cracks_.pairs.size(); ++k) {
+        const FieldPair& pair = cracks_.pairs[k];
+        if (!is_whole(pair)) continue;
+        const double tie = tie_of(pair);
+        const Mat2 held = face_stiffness(k);
+        if (tie == 0.0 && held.isZero(0.0)) continue;
         const Vec2 jump = displacement_[pair.left] - displacement_[pair.right];
+        const Vec2 place = apart(k, displacement_);
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             const double stiffer =
                 numbers[n].opening_modulus(pair.freed_at, 0.5 * body_.layout.cell, pair.along) / pair.plane_modulus;
-            const Vec2 pull = stiffer * stiffness * jump;
-            slope.potential[n] += 0.5 * pull.dot(jump);
-            add(n, pair.left, pull);
-            add(n, pair.right, -pull);
+            slope.potential[n] += 0.5 * stiffer * (tie * jump.squaredNorm() + place.dot(held * place));
+            add(n, pair.left, stiffer * tie * jump);
+            add(n, pair.right, -stiffer * tie * jump);
+            push_faces(k, stiffer * held * place, [&](int field, const Vec2& push) { add(n, field, push); });
         }
     }
     for (const Boundary::Tied& tie : boundary_.tied) {

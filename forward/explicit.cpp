@@ -207,7 +207,7 @@ void ExplicitSolver::advance_displacements(double share) {
 
 TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     EnergyReleaseOptions options;
-    options.rotates = options.faces_turn = options.sizes_K_by_J = plan_.rotates;
+    options.rotates = options.sizes_K_by_J = plan_.rotates;
     std::vector<Vec2> faces = face_force_;
     if (bridges_) bridges_->add_to(faces, normals_);
     TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, faces}, options);

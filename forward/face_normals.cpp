@@ -1,7 +1,5 @@
 #include "forward/face_normals.hpp"
 
-#include "forward/deformation.hpp"
-
 #include <algorithm>
 
 namespace crampfit {
@@ -40,13 +38,19 @@ void FaceNormals::take_in(const Discretisation& body, const CrackFields& cracks,
     first_share_.push_back(shares_.size());
 }
 
+std::span<const FaceNormals::Share> FaceNormals::shares(std::size_t pair) const {
+    if (!can_turn()) return {};
+    return {shares_.begin() + static_cast<std::ptrdiff_t>(first_share_[pair]), first_share_[pair + 1] - first_share_[pair]};
+}
+
+Polar FaceNormals::polar(std::size_t pair, const std::vector<Vec2>& displacement) const {
+    Mat2 gradient = Mat2::Zero();
+    for (const Share& share : shares(pair)) gradient += displacement[share.field] * share.slope.transpose();
+    return Polar(gradient);
+}
+
 void FaceNormals::turn(const std::vector<Vec2>& displacement) {
-    for (std::size_t k = 0; k + 1 < first_share_.size(); ++k) {
-        Mat2 gradient = Mat2::Zero();
-        for (std::size_t i = first_share_[k]; i < first_share_[k + 1]; ++i)
-            gradient += displacement[shares_[i].field] * shares_[i].slope.transpose();
-        turned_[k] = Polar(gradient).turn * undeformed_[k];
-    }
+    for (std::size_t k = 0; k + 1 < first_share_.size(); ++k) turned_[k] = polar(k, displacement).turn * undeformed_[k];
 }
 
 }  // namespace crampfit

@@ -1,7 +1,9 @@
 #pragma once
 
 #include "forward/cracks.hpp"
+#include "forward/deformation.hpp"
 
+#include <span>
 #include <vector>
 
 namespace crampfit {
@@ -18,11 +20,18 @@ class FaceNormals {
 
     const Vec2& operator[](std::size_t pair) const { return turned_[pair]; }
 
-  private:
+    bool can_turn() const { return !first_share_.empty(); }
+
+    /// How the wood about a pair has turned with fields that stand here [m].
+    Polar polar(std::size_t pair, const std::vector<Vec2>& displacement) const;
+
     struct Share {
         int field;
         Vec2 slope;  // of the mean gradient per displacement of the field [1/m]
     };
+    std::span<const Share> shares(std::size_t pair) const;
+
+  private:
     std::vector<Vec2> undeformed_, turned_;  // [pairs]
     std::vector<Share> shares_;
     std::vector<std::size_t> first_share_;  // [pairs + 1]; empty: nothing turns

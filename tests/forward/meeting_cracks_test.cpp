@@ -241,7 +241,7 @@ TEST(HardMeeting, APlateCutInTwoBeforehandCarriesPressureAlone) {
 }
 
 TEST(HardMeeting, WhatFindsNoEquilibriumIsNotSaidToCarryNothing) {
-    // A wheel that goes nearly through.
+    // A wheel that goes on by more than the specimen is high.
     Scene scene = square({line({-1, 9.8}, {10, 9.8})});
     scene.edges[0].range = {{0.0, 4e-3}};
     scene.edges[0].velocity[1] = 0.0;
@@ -251,7 +251,7 @@ TEST(HardMeeting, WhatFindsNoEquilibriumIsNotSaidToCarryNothing) {
     wheel.velocity = {0.0, -mm_per_minute};
     scene.bodies = {wheel};
     scene.measure = {"wheel", "wheel"};
-    scene.stop.displacement = 18e-3;
+    scene.stop.displacement = 22e-3;
     EXPECT_EQ(simulate(scene).status, RunStatus::unstable);
 }
 
