@@ -22,7 +22,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct CameraArguments {
     std::filesystem::path record, folder;
     std::string pixel, margin = "0 mm";
     std::filesystem::path wood;  // empty: a speckle pattern
@@ -42,7 +42,7 @@ double length_of(const std::string& text, const NumberRule& rule, const char* op
 }
 
 /// How the wood's picture lies on the specimen: as the record's scene has it, where it is made from a picture.
-Placement placement_of_wood(const Arguments& arguments, const Record& record) {
+Placement placement_of_wood(const CameraArguments& arguments, const Record& record) {
     const Document scene(record.scene_text, arguments.record, {});
     const Entry specimen = scene.root().at("specimen");
     Placement placement;
@@ -57,7 +57,7 @@ Placement placement_of_wood(const Arguments& arguments, const Record& record) {
 }
 
 /// The gray of the wood that the scene's specimen was made from.
-std::function<double(const Vec2&)> wood_of(const Arguments& arguments, const Record& record, double pixel) {
+std::function<double(const Vec2&)> wood_of(const CameraArguments& arguments, const Record& record, double pixel) {
     if (arguments.wood.empty()) return {};
     Placement placement = placement_of_wood(arguments, record);
     const FinePicture picture = read_fine_gray(arguments.wood, {"command line", "--wood"});
@@ -110,7 +110,7 @@ std::filesystem::path make_folder(const std::filesystem::path& folder) {
     return folder;
 }
 
-ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus photograph(const CameraArguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
     const double pixel = length_of(arguments.pixel, limits::pixel, "--pixel");
@@ -149,7 +149,7 @@ ExitStatus photograph(const Arguments& arguments, const CommonOptions& common) {
 }  // namespace
 
 Verb camera_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<CameraArguments>();
     CLI::App* verb = command.add_subcommand("camera", "Pictures that a camera would take of a simulated specimen");
     VirtualCameraOptions& options = arguments->options;
     verb->add_option("record", arguments->record, "A record with frames")->type_name("RECORD.h5")->required();

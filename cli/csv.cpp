@@ -8,7 +8,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct CsvArguments {
     std::filesystem::path file;
     std::string table;
 };
@@ -16,7 +16,7 @@ struct Arguments {
 }  // namespace
 
 Verb csv_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<CsvArguments>();
     CLI::App* verb = command.add_subcommand("csv", "Print a table of a result as CSV");
     verb->add_option("file", arguments->file, "What a verb of this command has saved")->type_name("FILE.h5")->required();
     verb->add_option("table", arguments->table, "Which table; an unknown name lists those that there are")

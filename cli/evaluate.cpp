@@ -17,7 +17,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct EvaluateArguments {
     std::filesystem::path study;
     std::filesystem::path parameters;
     std::filesystem::path results;
@@ -111,7 +111,7 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
     return "";
 }
 
-ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus evaluate_and_save(const EvaluateArguments& arguments, const CommonOptions& common) {
     check_output(arguments.results, {arguments.study, arguments.parameters});
     const Study study = open_study(arguments.study, common);
     check_output(arguments.results, files_of(study));
@@ -132,7 +132,7 @@ ExitStatus evaluate_and_save(const Arguments& arguments, const CommonOptions& co
 }  // namespace
 
 Verb evaluate_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<EvaluateArguments>();
     CLI::App* verb =
         command.add_subcommand("evaluate", "Evaluate a study once, for Dakota: its parameters file in, its results file out");
     verb->add_option("study", arguments->study, "The study")->type_name("STUDY.toml")->required();

@@ -12,7 +12,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct ReportArguments {
     std::filesystem::path file;
     std::filesystem::path output;
 };
@@ -27,7 +27,7 @@ std::string page_of(const std::filesystem::path& file) {
     root.refuse("kind", kind, "must be a record, a fit or a sensitivity study: other results have their preview");
 }
 
-ExitStatus write_report(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus write_report(const ReportArguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override in a file of results");
     check_output(arguments.output, {arguments.file});
@@ -39,7 +39,7 @@ ExitStatus write_report(const Arguments& arguments, const CommonOptions& common)
 }  // namespace
 
 Verb report_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<ReportArguments>();
     CLI::App* verb = command.add_subcommand("report", "One page in HTML to look at a result, self-contained");
     verb->add_option("file", arguments->file, "A record, a fit or a sensitivity study")->type_name("FILE.h5")->required();
     verb->add_option("-o,--output", arguments->output, "Where the page goes")->type_name("REPORT.html")->required();

@@ -2,11 +2,14 @@
 
 #include "datasets/io.hpp"
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 
 /// The pages of `crampfit report`, one file a kind of result.
 namespace crampfit::cli {
+
+constexpr std::size_t most_picture_bytes = 2'000'000;  // of all figures of one kind together: a page stays below 5 MB
 
 /// Where a result comes from.
 struct Origin {

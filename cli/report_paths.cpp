@@ -15,10 +15,9 @@ namespace crampfit::cli {
 
 namespace {
 
-constexpr std::size_t most_picture_bytes = 2'000'000;  // of all figures together: the page stays below 5 MB
-constexpr int picture_pixels = 900;                    // along the longer side
-constexpr double around = 0.08;                        // of a close-up, on each side, of its longer side
-constexpr double least_aspect = 0.5;                   // of a close-up, shorter to longer side
+constexpr int figure_pixels = 900;    // along the longer side
+constexpr double around = 0.08;       // of a close-up, on each side, of its longer side
+constexpr double least_aspect = 0.5;  // of a close-up, shorter to longer side
 
 /// What a figure shows of one experiment.
 struct Sight {
@@ -111,7 +110,7 @@ std::string figure(const Sight& sight, const std::vector<std::uint8_t>& png) {
 
 /// Pictures as coarse as it takes to keep together to `most_picture_bytes`.
 std::vector<std::string> draw_sights(std::vector<Sight> sights) {
-    for (double pixels = picture_pixels;;) {
+    for (double pixels = figure_pixels;;) {
         std::vector<std::string> drawings;
         std::size_t bytes = 0;
         for (Sight& sight : sights) {

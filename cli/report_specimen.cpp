@@ -17,9 +17,8 @@ namespace {
 using Colour = cv::Vec3b;  // blue, green, red
 
 constexpr std::size_t most_frames = 40;
-constexpr std::size_t most_picture_bytes = 2'000'000;  // of all frames together: the page stays below 5 MB
-constexpr int picture_pixels = 440;                    // along the longer side
-constexpr int stress_steps = 16;                       // of the colour scale: flat patches compress well
+constexpr int frame_pixels = 440;  // along the longer side
+constexpr int stress_steps = 16;   // of the colour scale: flat patches compress well
 
 /// A rectangle of the specimen's plane [m].
 struct View {
@@ -66,7 +65,7 @@ Vec2 spacing(const std::vector<Vec2>& points) {
 
 /// A PNG with each point as a small rectangle of its colour, on white.
 std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std::vector<Colour>& colours, const Vec2& spacing_of,
-                                      const View& view, int longer_side = picture_pixels) {
+                                      const View& view, int longer_side = frame_pixels) {
     const Vec2 size = view.high - view.low;
     if (!size.allFinite()) return {};
     const double scale = longer_side / size.maxCoeff();  // [px/m]
@@ -218,7 +217,7 @@ std::vector<Colour> stress_colours(const std::vector<double>& stresses, double l
 std::vector<std::vector<std::uint8_t>> draw_frames(const std::vector<std::vector<Vec2>>& places,
                                                    const std::vector<std::vector<Colour>>& colours, const Vec2& spacing_of,
                                                    const View& view) {
-    for (int pixels = picture_pixels;; pixels /= 2) {
+    for (int pixels = frame_pixels;; pixels /= 2) {
         std::vector<std::vector<std::uint8_t>> pictures;
         std::size_t bytes = 0;
         for (std::size_t i = 0; i < places.size(); ++i)

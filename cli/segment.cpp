@@ -19,7 +19,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct SegmentArguments {
     std::filesystem::path image, output, borders, preview;
     std::filesystem::path density, direction;
     std::string pixel, scale, pith, growth = "auto";
@@ -66,7 +66,7 @@ GrayClass gray_class(const std::string& text) {
     return range;
 }
 
-SegmentOptions options_of(const Arguments& arguments) {
+SegmentOptions options_of(const SegmentArguments& arguments) {
     static const std::map<std::string, GrowthAxis> growths{
         {"+x", GrowthAxis::right}, {"-x", GrowthAxis::left}, {"+y", GrowthAxis::up}, {"-y", GrowthAxis::down}};
     SegmentOptions options;
@@ -101,7 +101,7 @@ void keep_memory() {
     mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
 }
 
-ExitStatus segment_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus segment_and_save(const SegmentArguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override in a picture");
     const std::vector<std::filesystem::path> read{arguments.image, arguments.borders, arguments.density, arguments.direction};
@@ -124,7 +124,7 @@ ExitStatus segment_and_save(const Arguments& arguments, const CommonOptions& com
 }  // namespace
 
 Verb segment_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<SegmentArguments>();
     CLI::App* verb = command.add_subcommand("segment", "Picture to specimen: EW, LW, transition; ring borders; orientation");
     verb->add_option("image", arguments->image, "Any picture of the cross-section")->type_name("IMAGE")->required();
     verb->add_option("-o,--output", arguments->output, "Where the specimen goes")->type_name("SPECIMEN.h5")->required();

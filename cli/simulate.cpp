@@ -13,7 +13,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
     std::filesystem::path scene;
     std::filesystem::path output;
 };
@@ -43,7 +43,7 @@ Record run(const Scene& scene, const CommonOptions& common) {
     return simulate(scene, options);
 }
 
-ExitStatus simulate_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus simulate_and_save(const SimulateArguments& arguments, const CommonOptions& common) {
     check_output(arguments.output, {arguments.scene});
     Scene scene = read_scene(arguments.scene, overrides_of(common));
     check_output(arguments.output, files_of(scene));
@@ -62,7 +62,7 @@ ExitStatus simulate_and_save(const Arguments& arguments, const CommonOptions& co
 }  // namespace
 
 Verb simulate_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<SimulateArguments>();
     CLI::App* verb = command.add_subcommand("simulate", "Run one scene");
     verb->add_option("scene", arguments->scene, "The scene")->type_name("SCENE.toml")->required();
     verb->add_option("-o,--output", arguments->output, "Where the record goes")->type_name("RECORD.h5")->required();

@@ -19,7 +19,7 @@ namespace crampfit::cli {
 
 namespace {
 
-struct Arguments {
+struct TrackArguments {
     PictureSeries pictures;
     PictureTimes times;
     std::string from = "auto";  // auto, fields or gray
@@ -77,7 +77,7 @@ class TipFinder {
     int from_gray_ = 0;
 };
 
-CrackTrack start_track(const Arguments& arguments, const CommonOptions& common) {
+CrackTrack start_track(const TrackArguments& arguments, const CommonOptions& common) {
     const PictureSeries& pictures = arguments.pictures;
     CrackTrack track;
     track.reference = pictures.reference.string();
@@ -98,7 +98,7 @@ void keep_first(CrackTrack& track, std::size_t count) {
         column->resize(std::min(column->size(), count));
 }
 
-ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& common) {
+ExitStatus track_and_save(const TrackArguments& arguments, const CommonOptions& common) {
     const PictureSeries& pictures = arguments.pictures;
     check_series(pictures, common);
     CrackTrack track = start_track(arguments, common);
@@ -128,7 +128,7 @@ ExitStatus track_and_save(const Arguments& arguments, const CommonOptions& commo
 }  // namespace
 
 Verb track_verb(CLI::App& command, const CommonOptions& common) {
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<TrackArguments>();
     CLI::App* verb = command.add_subcommand("track", "Crack tip and crack length from pictures");
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
     add_picture_times(*verb, arguments->times);

@@ -15,8 +15,8 @@ using hdf5::Group;
 
 namespace {
 
-constexpr std::array<const char*, tip_status_count> status_names{"ok", "too few points", "no crack", "tip outside the picture",
-                                                                 "not lined up with the reference"};
+constexpr std::array<const char*, tip_status_count> tip_status_names{
+    "ok", "too few points", "no crack", "tip outside the picture", "not lined up with the reference"};
 
 struct TipColumn {
     const char* name;
@@ -69,7 +69,7 @@ void read_ways(const Group& root, std::vector<CrackTip>& tips) {
 
 }  // namespace
 
-const char* name(TipStatus status) { return status_names.at(static_cast<std::size_t>(status)); }
+const char* name(TipStatus status) { return tip_status_names.at(static_cast<std::size_t>(status)); }
 
 Curves curves_of(const CrackTrack& track) {
     Curves curves;
@@ -98,7 +98,7 @@ void write(const CrackTrack& track, const std::filesystem::path& file) {
         root.write_text("reference", track.reference, "picture that all others are compared with");
         root.write_texts("image files", track.images, "pictures by their number");
         if (track.pixel) root.write("pixel", *track.pixel, {"m", "edge of a pixel"});
-        root.write_texts("status names", {status_names.begin(), status_names.end()}, "whether a tip was found");
+        root.write_texts("status names", {tip_status_names.begin(), tip_status_names.end()}, "whether a tip was found");
         if (track.rows > 0) {
             root.write<std::int64_t>("columns", track.columns, {"px", "width of the pictures"});
             root.write<std::int64_t>("rows", track.rows, {"px", "height of the pictures"});

@@ -30,7 +30,7 @@ double number_in(const std::string& text, const Place& place) {
 }
 
 /// SI units in one of the density column's.
-double read_head(const std::string& line, const std::string& file) {
+double read_factor(const std::string& line, const std::string& file) {
     const auto [gray, density] = halves_of(line, file);
     if (gray != "gray") throw InputError(file, "head", line, "must be gray,density [kg/m^3]");
     const ColumnHeader header = parse_header(density, {file, "head"});
@@ -59,7 +59,7 @@ DensityTable read_density_table(const std::filesystem::path& file) {
         line = trim(line);
         if (line.empty() || line.front() == '#') continue;
         if (factor == 0) {
-            factor = read_head(line, name);
+            factor = read_factor(line, name);
             continue;
         }
         const auto [gray, density] = halves_of(line, name);

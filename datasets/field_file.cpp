@@ -9,7 +9,7 @@ using hdf5::Group;
 
 namespace {
 
-constexpr std::array<const char*, point_status_count> status_names{
+constexpr std::array<const char*, point_status_count> point_status_names{
     "ok",          "masked",         "across the mask",  "no contrast",
     "not reached", "no convergence", "left the picture", "low correlation",
     "moved apart"};
@@ -111,7 +111,7 @@ FieldSeries read_series(const Group& root) {
 
 }  // namespace
 
-const char* name(PointStatus status) { return status_names.at(static_cast<std::size_t>(status)); }
+const char* name(PointStatus status) { return point_status_names.at(static_cast<std::size_t>(status)); }
 
 void write_fields(const FieldSeries& series, const std::function<std::optional<DisplacementField>(int)>& field_of,
                   const std::filesystem::path& file) {
@@ -120,7 +120,7 @@ void write_fields(const FieldSeries& series, const std::function<std::optional<D
         root.write<std::int64_t>("subset", series.subset, {"px", "edge of a subset"});
         root.write<std::int64_t>("order", series.order, {"1", "of the warp within a subset"});
         if (series.pixel) root.write("pixel", *series.pixel, {"m", "edge of a pixel"});
-        root.write_texts("status names", {status_names.begin(), status_names.end()}, "what became of a point");
+        root.write_texts("status names", {point_status_names.begin(), point_status_names.end()}, "what became of a point");
         write_lattice(root, series.lattice);
         Group images = root.make_group("images", "a group an image, by its number from 0");
         std::vector<std::string> written;

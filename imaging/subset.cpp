@@ -86,7 +86,7 @@ void compose_inverse(Warp& warp, const Warp& step, double half) {
 }
 
 /// Bounds the displacement that a warp can give anywhere in its subset [px].
-double reach(const std::array<double, 6>& terms) {
+double reach_of(const std::array<double, 6>& terms) {
     double sum = 0;
     for (const double term : terms) sum += std::abs(term);
     return sum;
@@ -320,7 +320,7 @@ template <int Order>
 bool SubsetMatcher<Order>::stays_inside(int x, int y, const Warp& warp) const {
     const auto inside = [&](int centre, const std::array<double, 6>& terms_of, std::size_t along, int count) {
         const double spread =
-            std::abs(half_ + terms_of[along]) + reach(terms_of) - std::abs(terms_of[0]) - std::abs(terms_of[along]);
+            std::abs(half_ + terms_of[along]) + reach_of(terms_of) - std::abs(terms_of[0]) - std::abs(terms_of[along]);
         const double place = centre + terms_of[0];
         return place - spread >= 0 && place + spread <= count - 1;
     };

@@ -15,14 +15,14 @@ namespace {
 constexpr double resolution = 1e-3;
 
 // Next to the longest column: below that a slope is what rounding leaves of none.
-constexpr double rounding = 1e-9;
+constexpr double least_length = 1e-9;
 
 // Which columns tell their parameter's effect from none. To scale the others to length one would make of their scatter an effect
 // as large as any, which no direction that it is mixed into could be told from.
 std::vector<Eigen::Index> columns_with_effect(const Eigen::VectorXd& length, const Eigen::VectorXd& error) {
     std::vector<Eigen::Index> columns;
     for (Eigen::Index j = 0; j < length.size(); ++j) {
-        if (length[j] > std::max(rounding * length.maxCoeff(), 2 * error[j])) {
+        if (length[j] > std::max(least_length * length.maxCoeff(), 2 * error[j])) {
             columns.push_back(j);
         }
     }

@@ -18,13 +18,6 @@
 namespace crampfit {
 namespace {
 
-struct Setting {
-    std::string key;
-    std::size_t parameter;
-    double factor;   // of its value
-    double initial;  // SI
-};
-
 bool has(const Scene& scene, const std::string& key) {
     try {
         get_number(scene, key);
@@ -34,14 +27,21 @@ bool has(const Scene& scene, const std::string& key) {
     }
 }
 
-// By which equilibria have derivatives.
-bool is_of_wood(const Setting& setting) {
-    return setting.key.starts_with("materials.") || setting.key.starts_with("specimen.density_exponents.");
-}
-
 }  // namespace
 
 class KeptWalks::Store {
+    struct Setting {
+        std::string key;
+        std::size_t parameter;
+        double factor;   // of its value
+        double initial;  // SI
+    };
+
+    // By which equilibria have derivatives.
+    static bool is_of_wood(const Setting& setting) {
+        return setting.key.starts_with("materials.") || setting.key.starts_with("specimen.density_exponents.");
+    }
+
   public:
     Store(const Study& study, int threads) : threads_(threads), parameters_(study.parameters.size()) {
         for (const Scene* scene : scenes_of(study)) {

@@ -83,7 +83,7 @@ struct Image {
     double found_x = NAN, found_y = NAN;
 };
 
-std::vector<std::vector<std::string>> rows_of(const std::string& csv) {
+std::vector<std::vector<std::string>> fields_of(const std::string& csv) {
     std::vector<std::vector<std::string>> rows;
     std::istringstream lines(csv);
     std::string line;
@@ -129,8 +129,8 @@ void expect_tips(Command& command, const Block& block) {
     const Outcome tracked = with_images(command, "track", block, "track.h5");
     ASSERT_EQ(tracked.status, 0) << tracked.error;
     EXPECT_TRUE(contains(tracked.error, "clocks: by the displacement that images and load share")) << tracked.error;
-    const auto truth = rows_of(command.folder.read("pictures/truth.csv"));
-    const auto found = rows_of(command.run({"csv", command.path("track.h5"), "series"}).out);
+    const auto truth = fields_of(command.folder.read("pictures/truth.csv"));
+    const auto found = fields_of(command.run({"csv", command.path("track.h5"), "series"}).out);
     ASSERT_EQ(found.size(), truth.size());
     double sum = 0, worst = 0;
     int count = 0;

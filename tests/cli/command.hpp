@@ -7,6 +7,8 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
+#include <sstream>
 #include <string>
 #include <sys/wait.h>
 #include <thread>
@@ -71,3 +73,31 @@ class Command {
 };
 
 inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// A table as `csv` writes it, by the names of its columns.
+inline std::vector<std::map<std::string, std::string>> rows_of(const std::string& csv) {
+    const auto fields = [](const std::string& line) {
+        std::vector<std::string> parts;
+        std::istringstream in(line);
+        for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
+        return parts;
+    };
+    std::istringstream lines(csv);
+    std::string line;
+    std::getline(lines, line);
+    const std::vector<std::string> names = fields(line);
+    std::vector<std::map<std::string, std::string>> rows;
+    while (std::getline(lines, line)) {
+        const std::vector<std::string> values = fields(line);
+        for (std::size_t i = 0; i < names.size(); ++i) (i == 0 ? rows.emplace_back() : rows.back())[names[i]] = values.at(i);
+    }
+    return rows;
+}
+
+/// A table of runs without its last column.
+inline std::string without_seconds(const std::string& table) {
+    std::istringstream lines(table);
+    std::string kept, line;
+    while (std::getline(lines, line)) kept += line.substr(0, line.rfind(',')) + '\n';
+    return kept;
+}

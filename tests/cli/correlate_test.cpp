@@ -15,25 +15,6 @@ using namespace crampfit;
 
 namespace {
 
-std::vector<std::map<std::string, std::string>> rows_of(const std::string& csv) {
-    const auto fields = [](const std::string& line) {
-        std::vector<std::string> parts;
-        std::istringstream in(line);
-        for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
-        return parts;
-    };
-    std::istringstream lines(csv);
-    std::string line;
-    std::getline(lines, line);
-    const std::vector<std::string> names = fields(line);
-    std::vector<std::map<std::string, std::string>> rows;
-    while (std::getline(lines, line)) {
-        const std::vector<std::string> values = fields(line);
-        for (std::size_t i = 0; i < names.size(); ++i) (i == 0 ? rows.emplace_back() : rows.back())[names[i]] = values.at(i);
-    }
-    return rows;
-}
-
 const VirtualCamera& camera() {
     static const VirtualCamera one({.columns = 240, .rows = 200});
     return one;

@@ -66,7 +66,7 @@ frames = {}
                        SAMPLES, direction, frames);
 }
 
-const std::string study = R"(
+const std::string paths_study = R"(
 title = "Which way does the crack turn?"
 
 [[experiments]]
@@ -128,7 +128,7 @@ TEST(SystemPaths, PhotographedPathTellsTheCriterion) {
         curves.force.push_back(instant.force);
     }
     write_curves(curves, command.path("curves.csv"));
-    command.folder.write("study.toml", study);
+    command.folder.write("study.toml", paths_study);
     const Outcome fitted = done({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
     EXPECT_TRUE(contains(fitted.out, "path off by")) << fitted.out;
 
@@ -179,7 +179,7 @@ TEST(SystemPaths, PicturesThatDoNotFitAreRefusedBeforeAnythingRuns) {
     command.folder.write("curves.csv", "displacement [mm],force [N]\n0,0\n0.1,1\n");
     command.folder.write("text.png", "no picture");
     const auto refused = [&](const std::string& photograph, const std::string& phrase) {
-        std::string text = study;
+        std::string text = paths_study;
         const std::size_t at = text.find("photograph ="), end = text.find('\n', at);
         command.folder.write("study.toml", text.replace(at, end - at, "photograph = " + photograph));
         const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});

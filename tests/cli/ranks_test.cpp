@@ -13,7 +13,7 @@ using namespace crampfit;
 
 namespace {
 
-const std::string sensitivity_study = R"(
+const std::string small_study = R"(
 scene = "scene.toml"
 outputs = ["peak force", "work of fracture"]
 
@@ -65,23 +65,12 @@ Outcome on_ranks(Command& command, int ranks, int threads, const std::string& ve
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 255, command.folder.read("out.txt"), command.folder.read("error.txt")};
 }
 
-// A table without its last column, the seconds.
-std::string without_seconds(const std::string& table) {
-    std::string kept;
-    std::size_t begin = 0;
-    for (std::size_t end = 0; (end = table.find('\n', begin)) != std::string::npos; begin = end + 1) {
-        const std::string line = table.substr(begin, end - begin);
-        kept += line.substr(0, line.rfind(',')) + '\n';
-    }
-    return kept;
-}
-
 }  // namespace
 
 TEST(SystemRanks, SensitivityHasTheSameBits) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", sensitivity_study);
+    command.folder.write("study.toml", small_study);
     ASSERT_EQ(command.run({"sensitivity", command.path("study.toml"), "-o", command.path("alone.h5"), "--threads", "1"}).status,
               0);
     const std::string indices = command.run({"csv", command.path("alone.h5"), "indices"}).out;
@@ -116,7 +105,7 @@ TEST(SystemRanks, FitHasTheSameBits) {
 TEST(SystemRanks, FailedRunsAreRecorded) {
     Command command;
     command.folder.write("scene.toml", endless_scene);
-    command.folder.write("study.toml", sensitivity_study + "[runs]\ntime_limit = \"50 ms\"\n");
+    command.folder.write("study.toml", small_study + "[runs]\ntime_limit = \"50 ms\"\n");
     const Outcome outcome = on_ranks(command, 3, 1, "sensitivity", "ranks.h5");
     EXPECT_EQ(outcome.status, 1) << outcome.error;
     const std::string runs = command.run({"csv", command.path("ranks.h5"), "runs"}).out;
@@ -132,7 +121,7 @@ TEST(SystemRanks, ALostRankCostsNoRunThatHasEnded) {
     std::string scene = small_scene;
     scene.replace(scene.find("\"0.5 mm\""), 8, "\"0.2 mm\"");
     command.folder.write("scene.toml", scene);
-    command.folder.write("study.toml", sensitivity_study);
+    command.folder.write("study.toml", small_study);
     const std::string script = fmt::format(
         "mpirun --allow-run-as-root --oversubscribe --bind-to none -n 3 {} sensitivity {} -o {} --threads 1 > {} 2>&1 & job=$!\n"
         "for i in $(seq 6000); do [ \"$(stat -c %s {}.runs 2> /dev/null || echo 0)\" -gt 500 ] && break; sleep 0.01; done\n"
@@ -154,7 +143,7 @@ TEST(SystemRanks, ALostRankCostsNoRunThatHasEnded) {
 TEST(SystemRanks, BadInputIsSaidOnce) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", sensitivity_study + "best = 1\n");
+    command.folder.write("study.toml", small_study + "best = 1\n");
     const Outcome outcome = on_ranks(command, 3, 1, "sensitivity", "ranks.h5");
     EXPECT_EQ(outcome.status, 2) << outcome.error;
     const std::size_t first = outcome.error.find("sensitivity.best");

@@ -11,7 +11,7 @@ using namespace crampfit;
 
 namespace {
 
-const std::string study = R"(
+const std::string sensitivity_study = R"(
 scene = "scene.toml"
 outputs = ["peak force", "initial stiffness", "work of fracture"]
 
@@ -40,7 +40,7 @@ samples = 8
 TEST(SystemCommand, LocalSensitivityKnowsLinearFractureMechanics) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", study);
+    command.folder.write("study.toml", sensitivity_study);
     const Outcome outcome = command.run({"sensitivity", command.path("study.toml"), "-o", command.path("out.h5")});
     ASSERT_EQ(outcome.status, 0) << outcome.error;
     EXPECT_TRUE(contains(outcome.out, "elasticity")) << outcome.out;
@@ -70,7 +70,7 @@ TEST(SystemCommand, LocalSensitivityKnowsLinearFractureMechanics) {
 TEST(SystemCommand, MorrisAndSobolSensitivityPrintTheirTable) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", study);
+    command.folder.write("study.toml", sensitivity_study);
     for (const std::string method : {"morris", "sobol"}) {
         const Outcome outcome = command.run({"sensitivity", command.path("study.toml"), "-o", command.path("out.h5"), "--quiet",
                                              "--set", "sensitivity.method=" + method});
@@ -85,7 +85,7 @@ TEST(SystemCommand, MorrisAndSobolSensitivityPrintTheirTable) {
 TEST(SystemCommand, KilledSensitivityGoesOnToTheSameBits) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", study);
+    command.folder.write("study.toml", sensitivity_study);
     const auto words = [&](const std::string& output) {
         return std::vector<std::string>{
             "sensitivity", command.path("study.toml"), "-o",    command.path(output),      "--quiet", "--resume",
@@ -113,7 +113,7 @@ TEST(SystemCommand, KilledSensitivityGoesOnToTheSameBits) {
 TEST(SystemCommand, SensitivityRefusesAFitWithoutDataAndUnknownOutputs) {
     Command command;
     command.folder.write("scene.toml", slow_scene());
-    command.folder.write("study.toml", study);
+    command.folder.write("study.toml", sensitivity_study);
     const Outcome fit = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
     EXPECT_EQ(fit.status, 2);
     EXPECT_TRUE(contains(fit.error, "experiments")) << fit.error;

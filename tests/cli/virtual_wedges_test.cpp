@@ -35,13 +35,6 @@ double after(const std::string& text, const std::string& words) {
     return at == std::string::npos ? std::nan("") : std::stod(text.substr(at + words.size()));
 }
 
-std::string without_seconds(const std::string& table) {
-    std::istringstream lines(table);
-    std::string kept, line;
-    while (std::getline(lines, line)) kept += line.substr(0, line.rfind(',')) + '\n';
-    return kept;
-}
-
 }  // namespace
 
 // The truth lies on cells half as wide. Of intervals that hold it 95 times in a hundred, 5 or fewer of eight do six times in a

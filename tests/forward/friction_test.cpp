@@ -29,10 +29,6 @@ Body rough(std::string name, Shape shape, Vec2 velocity, double friction) {
     return body;
 }
 
-Vec2 push_of(const StaticTrial& run, int body) {
-    return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
-}
-
 // Places joined by any compliance: what is found is each one's own law, and open, gripping and sliding ones are among them.
 TEST(UnitFriction, ManyPlacesEachFollowTheirLaw) {
     std::mt19937 random(3);

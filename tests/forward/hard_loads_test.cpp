@@ -18,10 +18,6 @@ Body wheel(std::string name, Vec2 centre, double radius, Vec2 velocity) {
     return body;
 }
 
-Vec2 push_of(const StaticTrial& run, int body) {
-    return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
-}
-
 // Slope of the potential with time over the power of what prescribes motion, less one: they are the same at equilibrium. By
 // central differences over a hundredth of the travel.
 double slope_against_power(StaticTrial& run, double time) {

@@ -311,7 +311,7 @@ TEST(VerificationOrthotropicCrack, GIsTheLossOfPotentialPerCrackLength) {
     }
 }
 
-Scene edge_crack(double cell) {
+Scene orthotropic_edge_crack(double cell) {
     Scene scene = at_rest({20e-3, 20e-3}, cell);
     scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
     scene.measure = {"top", "top"};
@@ -322,7 +322,7 @@ Scene edge_crack(double cell) {
 }
 
 TEST(VerificationOrthotropicCrack, EqualConstantsRunAsIsotropicWood) {
-    Scene scene = edge_crack(0.5e-3);
+    Scene scene = orthotropic_edge_crack(0.5e-3);
     const TipLoad isotropic = AtRest(scene).load();
     const double E = earlywood().youngs_modulus, nu = earlywood().poisson_ratio;
     scene.materials["EW"] = {0.0, 0.0, earlywood().density, earlywood().toughness,
@@ -372,7 +372,7 @@ TEST(VerificationOrthotropicCrack, GAmongRingsIsTheSameMirrored) {
 
 TEST(VerificationOrthotropicCrack, GWhereTheGrainTurns) {
     // The pith lies 12 mm from the tip: the grain turns by a degree a cell, and G carries its turning explicitly.
-    Scene scene = edge_crack(0.2e-3);
+    Scene scene = orthotropic_edge_crack(0.2e-3);
     scene.materials["EW"] = wood();
     scene.specimen.pith = Vec2(6e-3, -2e-3);
     const double step = 0.1e-3;

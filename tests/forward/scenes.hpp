@@ -53,6 +53,11 @@ struct StaticTrial {
     }
 };
 
+/// What a body puts on the specimen [N].
+inline Vec2 push_of(const StaticTrial& run, int body) {
+    return run.equilibrium.reactions()[run.equilibrium.boundary().first_body() + body];
+}
+
 /// The scene at equilibrium instead of in damped motion.
 inline Scene at_equilibrium(Scene scene) {
     scene.solver.kind = SolverKind::quasistatic;

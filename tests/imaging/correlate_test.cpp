@@ -2,6 +2,7 @@
 #include "imaging/correlate.hpp"
 #include "imaging/spline_picture.hpp"
 #include "imaging/virtual_camera.hpp"
+#include "tests/imaging/pictures.hpp"
 #include "tests/imaging/plane_fields.hpp"
 
 #include "datasets/error.hpp"
@@ -17,12 +18,9 @@
 #include <random>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
-
-FinePicture fine(const GrayPicture& picture) {
-    return {picture.columns, picture.rows, {picture.gray.begin(), picture.gray.end()}};
-}
 
 struct Errors {
     double bias_u = 0, bias_v = 0;  // [px]

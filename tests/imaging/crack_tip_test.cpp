@@ -2,6 +2,7 @@
 #include "imaging/correlate.hpp"
 #include "imaging/crack_tip.hpp"
 #include "imaging/virtual_camera.hpp"
+#include "tests/imaging/pictures.hpp"
 #include "tests/imaging/plane_fields.hpp"
 
 #include <gtest/gtest.h>
@@ -10,12 +11,9 @@
 #include <cstdio>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
-
-FinePicture fine(const GrayPicture& picture) {
-    return {picture.columns, picture.rows, {picture.gray.begin(), picture.gray.end()}};
-}
 
 /// A camera, and the tips that it sees.
 class VirtualTest {
@@ -37,7 +35,7 @@ class VirtualTest {
 
 constexpr double subset = 31;
 
-struct Case {
+struct TipCase {
     const char* what;
     double angle;    // [rad]
     double opening;  // at 100 px behind the tip [px]
@@ -52,8 +50,9 @@ TEST(VerificationCrackTip, WithinTwoSubsetsInEveryFrame) {
     options.columns = 480;
     options.rows = 400;
     VirtualTest test(options);
-    for (const Case& one : {Case{"opening", 0, 2, 0}, Case{"opening wide", 0.1, 8, 0}, Case{"opening little", -0.1, 0.3, 0},
-                            Case{"mixed, turned", 2.6, 2, 1}, Case{"from above", 1.57, 2, 0.3}}) {
+    for (const TipCase& one :
+         {TipCase{"opening", 0, 2, 0}, TipCase{"opening wide", 0.1, 8, 0}, TipCase{"opening little", -0.1, 0.3, 0},
+          TipCase{"mixed, turned", 2.6, 2, 1}, TipCase{"from above", 1.57, 2, 0.3}}) {
         const Vec2 direction(std::cos(one.angle), std::sin(one.angle));
         Vec2 mean = Vec2::Zero();
         int frames = 0;

@@ -1,7 +1,7 @@
 // Drawn end grain whose truth is a formula, against the bars of borders, LW fraction, classes and orientation.
 #include "imaging/ring_profile.hpp"
 #include "imaging/segment.hpp"
-#include "tests/temporary_folder.hpp"
+#include "tests/imaging/pictures.hpp"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -13,16 +13,11 @@
 #include <numbers>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-Segmentation segment_pixels(const cv::Mat& pixels, const SegmentOptions& options = {}) {
-    const TemporaryFolder folder;
-    EXPECT_TRUE(cv::imwrite((folder / "a.png").string(), pixels));
-    return segment(folder / "a.png", options);
-}
+using std::numbers::pi;
 
 using Field = std::function<double(double x, double y)>;
 

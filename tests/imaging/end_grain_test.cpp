@@ -21,7 +21,7 @@ using namespace crampfit;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// FNV-1a (Fowler, Noll and Vo), 64 bit.
 std::uint64_t hash(const std::vector<std::uint8_t>& bytes) {

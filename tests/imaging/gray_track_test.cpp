@@ -30,7 +30,7 @@ WoodShot shaken(int seed) {
     return shot;
 }
 
-struct Case {
+struct GrayCase {
     const char* what;
     double angle;        // [rad]
     double opening;      // at 100 px behind the tip; a fifth of it slides [px]
@@ -39,10 +39,10 @@ struct Case {
     double worst, mean;  // bars: of the distance, and of the mean along the crack [px]
 };
 
-void expect_tips(const std::vector<Case>& cases) {
+void expect_tips(const std::vector<GrayCase>& cases) {
     double squares = 0;
     int count = 0, seed = 2;
-    for (const Case& one : cases) {
+    for (const GrayCase& one : cases) {
         const WoodCamera camera(end_grain_picture(columns, rows, one.period, one.pith, 3), 10);
         const GrayTracker tracker(camera.take({}), {});
         const Vec2 direction(std::cos(one.angle), std::sin(one.angle));

@@ -2,6 +2,7 @@
 // what is known from the drawing.
 #include "datasets/error.hpp"
 #include "imaging/segment.hpp"
+#include "tests/imaging/pictures.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -13,14 +14,9 @@
 #include <functional>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
-
-Segmentation segment_pixels(const cv::Mat& pixels, const SegmentOptions& options = {}) {
-    const TemporaryFolder folder;
-    EXPECT_TRUE(cv::imwrite((folder / "a.png").string(), pixels));
-    return segment(folder / "a.png", options);
-}
 
 /// Straight rings that grow to the right, askew.
 struct DrawnWood {

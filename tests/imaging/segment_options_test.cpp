@@ -4,6 +4,7 @@
 #include "imaging/end_grain.hpp"
 #include "imaging/picture.hpp"
 #include "imaging/segment.hpp"
+#include "tests/imaging/pictures.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -14,18 +15,9 @@
 #include <cstdio>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
-
-cv::Mat picture_of(const EndGrain& grown) {
-    return cv::Mat(grown.rows, grown.columns, CV_8UC3, const_cast<std::uint8_t*>(grown.bgr.data())).clone();
-}
-
-Segmentation segment_pixels(const cv::Mat& pixels, const SegmentOptions& options = {}) {
-    const TemporaryFolder folder;
-    EXPECT_TRUE(cv::imwrite((folder / "a.png").string(), pixels));
-    return segment(folder / "a.png", options);
-}
 
 /// The picture turned about its middle, on an even ground that is larger than it.
 cv::Mat turned_on(const cv::Mat& pixels, double degrees, const cv::Scalar& ground) {

@@ -3,6 +3,7 @@
 #include "imaging/picture.hpp"
 #include "imaging/preview.hpp"
 #include "imaging/segment.hpp"
+#include "tests/imaging/pictures.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include "datasets/error.hpp"
@@ -19,20 +20,11 @@
 #include <sstream>
 
 using namespace crampfit;
+using namespace crampfit::test;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-Segmentation segment_pixels(const cv::Mat& pixels, SegmentOptions options = {}, const std::string& name = "a.png") {
-    const TemporaryFolder folder;
-    EXPECT_TRUE(cv::imwrite((folder / name).string(), pixels));
-    return segment(folder / name, options);
-}
-
-cv::Mat picture_of(const EndGrain& grown) {
-    return cv::Mat(grown.rows, grown.columns, CV_8UC3, const_cast<std::uint8_t*>(grown.bgr.data())).clone();
-}
+using std::numbers::pi;
 
 /// Hard for the eye: noise of 5 % of the full range, wavy rings, uneven light, rays, cells.
 EndGrainOptions noisy_block(std::uint64_t seed) {

@@ -13,7 +13,7 @@ namespace crampfit::testing {
 namespace {
 
 constexpr double pixel = 20e-6;                                  // [m]
-constexpr double true_earlywood = 60e6, true_latewood = 1000e6;  // E [Pa]
+constexpr double earlywood_modulus = 60e6, latewood_modulus = 1000e6;  // E [Pa]
 
 // A strip of 20 x 10 mm between grips, its growth rings across the pull.
 Scene strip(double cell) {
@@ -21,8 +21,8 @@ Scene strip(double cell) {
     scene.model = {.plane = PlaneCondition::stress, .thickness = 10e-3, .cell = cell};
     scene.specimen.size = {20e-3, 10e-3};
     scene.specimen.rings = Rings{Vec2(-30e-3, 5e-3), 3e-3, 0.3, 0.0};
-    scene.materials["EW"] = {true_earlywood, 0.33, 300, 100};
-    scene.materials["LW"] = {true_latewood, 0.33, 800, 100};
+    scene.materials["EW"] = {earlywood_modulus, 0.33, 300, 100};
+    scene.materials["LW"] = {latewood_modulus, 0.33, 800, 100};
     scene.edges = {{"left", Side::left, {}, {0.0, 0.0}, {}, {}}, {"right", Side::right, {}, {1e-5, 0.0}, {}, {}}};
     scene.measure = {"right", "right"};
     scene.solver.kind = SolverKind::quasistatic;
@@ -97,7 +97,7 @@ Fit fit(const Study& study) {
 
 void expect_moduli(const Fit& found, const char* what) {
     ASSERT_EQ(found.parameters.size(), 2u) << found.message;
-    const double truth[] = {true_earlywood / 1e6, true_latewood / 1e6};
+    const double truth[] = {earlywood_modulus / 1e6, latewood_modulus / 1e6};
     for (int j = 0; j < 2; ++j) {
         const FittedParameter& p = found.parameters[j];
         std::printf("%s, %s: %.2f MPa (%+.2f %% of %.0f), 95 %% within %.2f .. %.2f; %zu runs, reduced chi-square %.3g, %.1f s\n",
