@@ -61,7 +61,7 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
     Eigen::Index next = count;
     for (Eigen::Index j = 0; j < p; ++j) {
         if (std::find(told.begin(), told.end(), j) == told.end()) {
-            result.error[next] = length[j] > rounding * length.maxCoeff() ? error[j] : 0.0;
+            result.error[next] = length[j] > least_length * length.maxCoeff() ? error[j] : 0.0;
             result.v(j, next++) = 1;
         }
     }
