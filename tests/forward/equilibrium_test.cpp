@@ -587,7 +587,7 @@ struct TurnedBlock {
 
 TEST(UnitCrackFaces, PressAndRubAlongNormalsThatTurn) {
     for (const CrackFaces::Kind faces : {CrackFaces::Kind::frictionless, CrackFaces::Kind::stick, CrackFaces::Kind::friction}) {
-        const TurnedBlock upright(faces, 0.0), open(CrackFaces::Kind::frictionless, 0.0);
+        const TurnedBlock upright(faces, 0.0);
         for (const double angle : {0.5, 1.6, 3.1}) {
             const TurnedBlock turned(faces, angle);
             double off = 0, largest = 0;
