@@ -284,12 +284,13 @@ class Equilibrium {
     Eigen::MatrixXd free_motion_;     // [equations x free] how the grid follows them
     Eigen::MatrixXd free_yield_;      // [free x free] how they yield to forces [m/N]
 
-    // Round bodies push on more than a cell at a time:
+    // Round bodies push on more than a cell at a time, crack faces on all that turns the wood about them:
     struct Spread {
-        std::vector<int> rows;      // equations
-        Eigen::MatrixXd stiffness;  // that the cell does not hold [N/m]
+        std::vector<int> rows;      // equations, or -1
+        Eigen::MatrixXd stiffness;  // [columns x columns] of what no cell holds, columns * stiffness * columns^T [N/m]
+        Eigen::MatrixXd columns;    // [rows x any number]; empty: one a row
     };
-    std::vector<Spread> spread_;  // of touches, and of crack faces that press along normals that turn
+    std::vector<Spread> spread_;
 
     // Friction:
     struct Rubbing {                // what the factor leaves out of the tangent at a place that rubs: it is not symmetric

@@ -79,16 +79,13 @@ void Equilibrium::add_turning(std::size_t k, const Mat2& held, const Mat2& remai
     const Polar polar = normals_.polar(k, displacement_);
     const Mat2& turn = polar.turn;
     const Vec2 place = apart(k, displacement_);
-    Eigen::VectorXd angle = Eigen::VectorXd::Zero(size), rho = angle, aside = angle;
+    Eigen::VectorXd angle = Eigen::VectorXd::Zero(size), rho = angle;
     for (const FaceNormals::Share& share : shares) {
         const auto at = 2 * (std::ranges::find(fields, share.field) - fields.begin());
         const TurnSlope slope(polar, share.slope);
         angle.segment<2>(at) = slope.angle;
         rho.segment<2>(at) = slope.rho;
     }
-    Eigen::MatrixXd apart_slope = -left_of(place) * angle.transpose();
-    apart_slope.leftCols<2>() += turn.transpose();
-    apart_slope.middleCols<2>(2) -= turn.transpose();
     std::vector<int> rows(size), of_grid(size);
     std::vector<double> steps(size);
     for (Eigen::Index a = 0; a < size; ++a) {
@@ -97,20 +94,28 @@ void Equilibrium::add_turning(std::size_t k, const Mat2& held, const Mat2& remai
         of_grid[a] = equation_[dof];
         steps[a] = prescribed_step_[dof];
     }
-    if (!remainder.isZero(0.0)) add_rubbing(rows, steps, apart_slope.transpose() * remainder * apart_slope);
+    if (!remainder.isZero(0.0)) {
+        Eigen::MatrixXd apart_slope = -left_of(place) * angle.transpose();
+        apart_slope.leftCols<2>() += turn.transpose();
+        apart_slope.middleCols<2>(2) -= turn.transpose();
+        add_rubbing(rows, steps, apart_slope.transpose() * remainder * apart_slope);
+    }
     if (shares.empty()) return;
-    Eigen::MatrixXd stiffness = apart_slope.transpose() * held * apart_slope;
-    const Mat2 own = turn * held * turn.transpose();
-    stiffness.topLeftCorner<4, 4>() -= (Eigen::Matrix4d() << own, -own, -own, own).finished();
+    const Vec2 across = left_of(place);
+    Vec2 push = -held * across;
+    Eigen::VectorXd aside = 0.5 * across.dot(held * across) * angle;
     if (geometric && !joins_faces_) {
         const Vec2 p = face_stiffness(k) * place - face_drag(k).force;
-        aside.head<2>() = turn * left_of(p);
-        aside.segment<2>(2) = -aside.head<2>();
-        aside += p.dot(left_of(place)) * rho - 0.5 * p.dot(place) * angle;
-        stiffness += aside * angle.transpose() + angle * aside.transpose();
+        push += left_of(p);
+        aside += p.dot(across) * rho - 0.5 * p.dot(place) * angle;
     }
-    couple(rows, steps, stiffness);
-    spread_.push_back({std::move(of_grid), std::move(stiffness)});
+    aside.head<2>() += turn * push;
+    aside.segment<2>(2) -= turn * push;
+    Eigen::MatrixXd columns(size, 2);
+    columns << aside, angle;
+    const Mat2 stiffness = (Mat2() << 0.0, 1.0, 1.0, 0.0).finished();
+    couple(rows, steps, columns * stiffness * columns.transpose());
+    spread_.push_back({std::move(of_grid), stiffness, std::move(columns)});
 }
 
 bool Equilibrium::is_closed(std::size_t k) const { return apart(k, displacement_).dot(cracks_.pairs[k].normal) < 0.0; }
@@ -317,7 +322,7 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
         for (int b = 0; b < 8; ++b) tangent(2 * place(own[a / 2]) + a % 2, 2 * place(own[b / 2]) + b % 2) -= own_tangent(a, b);
     for (std::size_t a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
     rows.resize(size);
-    spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size)});
+    spread_.push_back({std::move(rows), tangent.topLeftCorner(size, size), {}});
 }
 
 // Wheels that a few cells go round feel what the grid misses of the wood's yield, where it is known before what they may touch.
@@ -357,7 +362,6 @@ void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vec
         push.col(i).tail<2>() -= touches[i].normal;
     }
     const Eigen::MatrixXd pull = push * pressed.stiffness.asDiagonal() * pressed.share;
-    const Eigen::MatrixXd change = -pull * pressed.gives * pull.transpose();
     std::vector<int> rows(size + 2);
     std::vector<double> steps(size + 2);
     for (Eigen::Index a = 0; a < size + 2; ++a) {
@@ -365,31 +369,42 @@ void Equilibrium::add_yield(const SlidingBody& rigid, int driver, const std::vec
         rows[a] = dof < 0 ? row_of_body(driver, axis) : row_of(dof);
         steps[a] = dof < 0 ? still_to_go_[driver][axis] : prescribed_step_[dof];
     }
-    couple(rows, steps, change);
+    couple(rows, steps, -pull * pressed.gives * pull.transpose());
     for (Eigen::Index a = 0; a < size; ++a) rows[a] = equation_[2 * fields[a / 2] + a % 2];
     rows.resize(size);
-    spread_.push_back({std::move(rows), change.topLeftCorner(size, size)});
+    spread_.push_back({std::move(rows), -pull.topRows(size) * pressed.gives * pull.topRows(size).transpose(), {}});
 }
 
-// Into the factor.
+// Into the factor. Touches share rows and have one column for each of these together.
 bool Equilibrium::take_in_spread() {
-    std::vector<int> rows;  // of all, in order
+    std::vector<int> units;  // equations
     for (const Spread& spread : spread_)
-        for (const int row : spread.rows)
-            if (row >= 0) rows.push_back(row);
-    if (rows.empty()) return true;
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(rows.size(), rows.size());
+        if (spread.columns.size() == 0)
+            std::ranges::copy_if(spread.rows, std::back_inserter(units), [](int row) { return row >= 0; });
+    std::ranges::sort(units);
+    units.erase(std::ranges::unique(units).begin(), units.end());
+    auto count = static_cast<Eigen::Index>(units.size());
+    std::vector<Eigen::Triplet<double>> columns;
+    for (Eigen::Index k = 0; k < count; ++k) columns.emplace_back(units[k], k, 1.0);
+    std::vector<Eigen::Triplet<double>> stiffness;
     for (const Spread& spread : std::exchange(spread_, {})) {
-        std::vector<std::ptrdiff_t> at;
-        for (const int row : spread.rows)
-            at.push_back(row < 0 ? -1 : std::lower_bound(rows.begin(), rows.end(), row) - rows.begin());
+        std::vector<Eigen::Index> at;  // its columns among all, or -1
+        for (Eigen::Index k = 0; k < spread.columns.cols(); ++k) {
+            for (std::size_t a = 0; a < spread.rows.size(); ++a)
+                if (spread.rows[a] >= 0) columns.emplace_back(spread.rows[a], count, spread.columns(a, k));
+            at.push_back(count++);
+        }
+        if (at.empty())
+            for (const int row : spread.rows) at.push_back(row < 0 ? -1 : std::ranges::lower_bound(units, row) - units.begin());
         for (std::size_t b = 0; b < at.size(); ++b)
             for (std::size_t a = 0; a < at.size(); ++a)
-                if (at[a] >= 0 && at[b] >= 0) stiffness(at[a], at[b]) += spread.stiffness(a, b);
+                if (at[a] >= 0 && at[b] >= 0) stiffness.emplace_back(at[a], at[b], spread.stiffness(a, b));
     }
-    return factor_.add_wide(rows, stiffness);
+    if (count == 0) return true;
+    GridFactor::Sparse all(equations_, count), between(count, count);
+    all.setFromTriplets(columns.begin(), columns.end());
+    between.setFromTriplets(stiffness.begin(), stiffness.end());
+    return factor_.add_wide(all, between);
 }
 
 bool Equilibrium::rubs(const FieldPair& pair) const {

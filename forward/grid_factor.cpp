@@ -532,23 +532,21 @@ Eigen::MatrixXd GridFactor::compliance(const Sparse& right) const {
     return found;
 }
 
-bool GridFactor::add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness) {
-    const auto columns = static_cast<Eigen::Index>(equations.size());
-    Sparse units(std::reduce(count_.begin(), count_.end()), columns);
-    for (Eigen::Index k = 0; k < columns; ++k) units.insert(equations[k], k) = 1.0;
-    wide_ = forward_parts(units);
-    Eigen::MatrixXd yield = Eigen::MatrixXd::Zero(columns, columns);  // Z^T Z
+bool GridFactor::add_wide(const Sparse& columns, const Sparse& stiffness) {
+    const Eigen::Index count = columns.cols();
+    wide_ = forward_parts(columns);
+    Eigen::MatrixXd yield = Eigen::MatrixXd::Zero(count, count);  // Z^T Z
     for (const Part& part : wide_) yield(part.sides, part.sides) += part.rows.transpose() * part.rows;
-    const Eigen::LLT<Eigen::MatrixXd> root(yield);
-    const auto failed = [&] {
+    const Eigen::LDLT<Eigen::MatrixXd> parts(yield);
+    const Eigen::MatrixXd root = parts.transpositionsP().transpose() * Eigen::MatrixXd(parts.matrixL()) *
+                                 parts.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal();  // C
+    const Eigen::MatrixXd across = stiffness * root;
+    const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(count, count) + root.transpose() * across);
+    if (inner.info() != Eigen::Success) {
         wide_.clear();
         return false;
-    };
-    if (root.info() != Eigen::Success) return failed();
-    const Eigen::MatrixXd across = stiffness * Eigen::MatrixXd(root.matrixL());  // R C
-    const Eigen::LLT<Eigen::MatrixXd> inner(Eigen::MatrixXd::Identity(columns, columns) + root.matrixL().transpose() * across);
-    if (inner.info() != Eigen::Success) return failed();
-    wide_change_ = stiffness - across * inner.solve(across.transpose());
+    }
+    wide_change_ = Eigen::MatrixXd(stiffness) - across * inner.solve(across.transpose());
     return true;
 }
 

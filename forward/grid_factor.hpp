@@ -53,9 +53,9 @@ class GridFactor {
     /// Takes half of a solution, and less as each is nil in most places.
     Eigen::MatrixXd compliance(const Sparse& right) const;
 
-    /// Adds a stiffness between equations, in order, that may lie cells apart; `factor` takes it off again. False when the sum is
-    /// not positive definite.
-    bool add_wide(const std::vector<int>& equations, const Eigen::MatrixXd& stiffness);
+    /// Adds P R P^T, where the columns P [equations x any number] reach cells far from each other and need not be independent,
+    /// and R [columns x columns] is symmetric; `factor` takes it off again. False when the sum is not positive definite.
+    bool add_wide(const Sparse& columns, const Sparse& stiffness);
 
     /// A cheap estimate of 1 / condition number: (least / largest diagonal entry of the factor) squared.
     double reciprocal_condition() const;
@@ -124,8 +124,8 @@ class GridFactor {
     int forks_ = 0;                       // levels of the tree at which its halves go side by side
     mutable std::vector<double> fronts_;  // room for a solution
 
-    // What `add_wide` has added, R between the unknowns P x. With A = L L^T the inverse of A + P^T R P is L^-T (1 - Z W Z^T)
-    // L^-1, where Z = L^-1 P^T, W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
+    // What `add_wide` has added. With A = L L^T the inverse of A + P R P^T is L^-T (1 - Z W Z^T) L^-1, where Z = L^-1 P,
+    // W = R - R C (1 + C^T R C)^-1 C^T R and C C^T = Z^T Z (Woodbury 1950).
     struct Part {                // of L^-1 R, R sparse
         int first;               // equation
         std::vector<int> sides;  // that are not nil in the equations from there on

@@ -5,9 +5,12 @@
 #include "forward/explicit.hpp"
 #include "forward/simulate.hpp"
 
+#include <cmath>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
+#include <vector>
 
 namespace crampfit::test {
 
@@ -89,6 +92,30 @@ inline Scene ring_specimen(double crack_length, double cell, bool rings = true) 
     scene.solver.damping = 4e4;
     scene.stop.time = 6e-4;  // vibration has died out to 1e-5 by then
     return scene;
+}
+
+inline Mat2 turn(double angle) {
+    Mat2 R;
+    R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+    return R;
+}
+
+/// A cracked block of earlywood, or of rings whose boundaries cross many cells.
+inline Scene cracked_block(bool rings) {
+    Scene scene = rings ? ring_specimen(3e-3, 1e-3) : block({6e-3, 6e-3}, 1e-3);
+    if (rings) scene.specimen.rings->pith = {-6e-3, -3e-3};
+    Crack crack;
+    crack.points = {Vec2(0, 3.3e-3), Vec2(2.6e-3, 3.1e-3)};
+    scene.cracks = {crack};
+    return scene;
+}
+
+inline std::vector<Vec2> random_displacement(int fields) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> in(-0.2e-3, 0.2e-3);
+    std::vector<Vec2> displacement(fields);
+    for (Vec2& u : displacement) u = Vec2(in(random), in(random));
+    return displacement;
 }
 
 }  // namespace crampfit::test
