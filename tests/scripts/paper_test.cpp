@@ -5,6 +5,7 @@
 #include "forward/simulate.hpp"
 #include "imaging/picture.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,7 +41,7 @@ Trip run(const std::string& sample, double speed, double cell_mm, Overrides furt
     }
     overrides.insert(overrides.end(), further.begin(), further.end());
     Trip made;
-    made.scene = read_scene(std::string(SAMPLES) + "/" + sample + ".toml", overrides);
+    made.scene = read_scene(fmt::format("{}/{}.toml", SAMPLES, sample), overrides);
     load_specimen(made.scene);
     made.record = simulate(made.scene);
     return made;
