@@ -3,6 +3,8 @@
 #include "datasets/error.hpp"
 #include "forward/side_by_side.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -103,6 +105,7 @@ Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nul
 
 bool Quasistatic::fail() {
     failure_ = "no equilibrium was found";
+    if (!plan_.linear && failed_time_ > 0) failure_ += fmt::format(" at {:.4g} s", time_of(failed_time_));
     return false;
 }
 
@@ -473,6 +476,7 @@ bool Quasistatic::find(std::size_t number, int time) {
     }
     if (!parted(number)) {
         place.failed[time] = known;
+        failed_time_ = time;
         return false;
     }
     keep(number, time, nothing(time_of(time)));
@@ -495,7 +499,9 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
     const Station& station = places_[number].station;
     if (!plan_.linear) {
         const int low = std::clamp(static_cast<int>(time / time_step_), 0, last_time_ - 1);
-        if (!know(number, low) || !know(number, low + 1)) fail();
+        const bool between = time > time_of(low);
+        if (!know(number, low) || (between && !know(number, low + 1))) fail();
+        if (between && !station.states.count(low + 1) && station.states.count(low)) time = time_of(low);
     }
     return station.states.empty() ? nothing(time) : station.at(time);
 }

@@ -59,7 +59,8 @@ class Quasistatic {
     /// The station, with all its states that have been asked for. It must have been reached.
     const Station& station(std::size_t number) const { return places_[way_[number]].station; }
 
-    /// The load at which the crack moves on from a station.
+    /// The load at which the crack moves on from a station. Where an equilibrium is missing that would tell, the time is that
+    /// until which the crack stands for sure.
     struct Critical {
         double time = std::numeric_limits<double>::infinity();  // [s]; infinite: not before the end of the loading
         double toughness = 0;                                   // that it overcomes: the mean over the route [J/m^2]
@@ -69,7 +70,7 @@ class Quasistatic {
     /// from what is known already or, `closely`, from a state not long before.
     Critical critical(std::size_t station, const MaterialMap& materials, double now, bool closely = false);
 
-    /// What a station is like at a time.
+    /// What a station is like at a time; at the last one that is known before it where an equilibrium is missing.
     LoadState at(std::size_t station, double time);
 
     /// What the scene's probes read there then [readings] [m]; empty where there is no equilibrium.
@@ -223,6 +224,7 @@ class Quasistatic {
     double time_step_ = 0;              // between two times at which equilibria are known [s]
     int last_time_ = 0;                 // number of the last of them
     std::string failure_;
+    int failed_time_ = 0;  // the last one without an equilibrium
     int equilibria_ = 0;
     Equilibrium::Outcome outcome_ = Equilibrium::Outcome::solved;  // of the last one
 

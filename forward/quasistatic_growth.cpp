@@ -305,13 +305,14 @@ std::vector<unsigned> Quasistatic::fronts(int number, const MaterialMap& materia
 }
 
 Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMap& materials, double now, bool closely) {
+    if (!failure_.empty()) return {now};
     const int here = way_[number];
     if (places_[here].station.left || growing_.empty()) return {};
     if (growing_.size() == 1) return critical_of_front(here, materials, now, never, closely);
     const int time = time_until(now);
     if (!know(here, time)) {
         fail();
-        return {};
+        return {now};
     }
     struct Front {
         unsigned tips;
@@ -330,7 +331,7 @@ Quasistatic::Critical Quasistatic::critical(std::size_t number, const MaterialMa
         if (moving != 0 && front.expected > far_above * std::max(now, first.time)) continue;
         if (!let_move(here, front.tips, now)) fail();
         const Critical found = critical_of_front(here, materials, now, first.time, closely);
-        if (!failure_.empty()) return {};
+        if (!failure_.empty()) return {std::min(found.time, first.time)};
         if (std::isfinite(found.time)) tried_[front.tips] = found.time * front.drive;
         if (moving != 0 && found.time >= first.time) continue;
         first = found;
@@ -350,9 +351,11 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         for (const int time : {0, 1, 2}) know_ahead(number, time);
         return judge();
     }
+    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
+    int high = low + 1;
     const auto missing = [&]() -> Critical {
         fail();
-        return {};
+        return {std::max(now, time_of(low))};
     };
     if (rough_) {
         bool some = false;
@@ -360,8 +363,6 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
             if (time > 0 && places_[places_[number].further].states.count(time)) some = know_ahead(number, time) || some;
         if (some) return judge();
     }
-    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
-    int high = low + 1;
     // As long as G at the tip is this far below the toughness, what lies ahead is not asked for; were the next advance to release
     // more all the same, that shows later, and what is missing is found then.
     const auto far_from_critical = [&](int time) {

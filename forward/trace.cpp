@@ -107,8 +107,9 @@ class Tracer {
         // Where nothing tells the end, half of the rows come before the crack grows, and as many each time that lasts once more.
         if (!std::isfinite(sample_) && found.time > 0.0) sample_ = 2.0 * found.time / scene_.output.samples;
         toughness_.push_back(found.toughness);
+        if (!walk_.failure().empty()) return false;
         list_driving(i, found, now);
-        return walk_.failure().empty();
+        return true;
     }
 
     Moment moment(std::size_t i, double time) {
@@ -119,7 +120,10 @@ class Tracer {
     void follow() {
         Moment here = moment_at_rest();
         add(here, false);
-        if (!know_station(0, 0.0)) return;
+        if (!know_station(0, 0.0)) {
+            if (!critical_.empty()) stand(0, here, critical_[0]);
+            return;
+        }
         double now = 0.0;
         std::size_t i = 0;
         while (true) {
@@ -267,12 +271,13 @@ class Tracer {
             end(RunStatus::finished, "a stop condition was met");
     }
 
-    // The crack stands while the load rises.
+    // The crack stands while the load rises, or until an equilibrium is missing.
     void stand(std::size_t i, Moment from, double until) {
         for (double time = next_sample(from.load.time); time < until - rounding * sample_ && !done_; time = next_sample(time)) {
             const Moment to = moment(i, time);
             go(from, to);
             from = to;
+            if (to.load.time < time) return;
         }
         if (!done_ && until > from.load.time) go(from, moment(i, until));
     }
