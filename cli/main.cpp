@@ -26,6 +26,9 @@ void start_log(const CommonOptions& common, const std::vector<std::string>& word
     };
     if (std::ranges::count_if(words, is_log) > std::ranges::count(words, "--log"))
         throw InputError("command line", "--log", common.log.string(), "must not be a file that is read or made");
+    if (const auto folder = common.log.parent_path(); !folder.empty() && !std::filesystem::is_directory(folder))
+        throw InputError("command line", "--log", common.log.string(),
+                         fmt::format("the folder '{}' does not exist", folder.string()));
     try {
         spdlog::set_default_logger(spdlog::basic_logger_mt("file", common.log.string()));
     } catch (const spdlog::spdlog_ex&) {

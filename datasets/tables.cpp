@@ -403,8 +403,12 @@ void print_one_of(const std::vector<Offer>& offers, const std::filesystem::path&
                   std::ostream& out) {
     std::vector<std::string> names;
     for (const Offer& offer : offers) {
-        if (offer.name == wanted) return print(offer.make(), out);
         names.push_back(offer.name);
+        if (offer.name != wanted) continue;
+        const Table table = offer.make();
+        if (table.front().empty())  // a track without clock, load and scale
+            throw InputError(file.string(), "table", wanted, "has no column: give `crampfit track` --times, --load or --pixel");
+        return print(table, out);
     }
     throw InputError(file.string(), "table", wanted,
                      names.empty() ? "this file has no tables" : fmt::format("must be one of: {}", fmt::join(names, ", ")));

@@ -16,6 +16,8 @@ constexpr double just_after = 1e-9;
 
 constexpr double rounding = 1e-6;  // of the time between two rows
 
+constexpr const char* met = "a stop condition was met";
+
 // One instant of the way: what a row of the series shows.
 struct Moment {
     LoadState load;
@@ -73,7 +75,7 @@ class Tracer {
         follow();
         if (!walk_.failure().empty()) {
             record_.status = RunStatus::unstable;
-            record_.message = walk_.failure();
+            record_.message = walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "");
         }
         record_paths();
         if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;
@@ -120,6 +122,7 @@ class Tracer {
     void follow() {
         Moment here = moment_at_rest();
         add(here, false);
+        if (beyond_displacement(here) || beyond_length(here)) return end(RunStatus::finished, met);
         if (!know_station(0, 0.0)) {
             if (!critical_.empty()) stand(0, here, critical_[0]);
             return;
@@ -132,13 +135,16 @@ class Tracer {
                 if (std::isfinite(until)) {
                     if (!std::isfinite(sample_)) sample_ = until / scene_.output.samples;
                     stand(i, here, std::max(now, until));
+                } else if (i > 0) {
+                    jump(i, now, here);
                 }
                 if (done_) return;
                 if (walk_.station(i).split()) return split();
-                return end(RunStatus::finished, std::isfinite(end_time()) ? "a stop condition was met"
-                                                : std::isfinite(until)
-                                                    ? "all that moves stands still, and no stop condition can be met any more"
-                                                    : "no crack grows under this load: no stop condition can be met");
+                return end(RunStatus::finished,
+                           std::isfinite(end_time())   ? met
+                           : std::isfinite(until)      ? "all that moves stands still, and no stop condition can be met any more"
+                           : record_.series.size() > 1 ? "no crack grows on under this load: no stop condition can be met"
+                                                       : "no crack grows under this load: no stop condition can be met");
             }
             if (i == 0) stand(0, here, critical_[0]);
             else go(here, moment(i, critical_[i]));
@@ -160,14 +166,16 @@ class Tracer {
                     return end(RunStatus::interrupted, "stopped by the user");
                 known = know_station(++next, now);
             }
-            if (!known) return end(RunStatus::finished, "the crack's way ends here");
+            if (!known) {
+                if (next > i + 1) jump(next - 1, now, here);
+                runs_on_ = next > i + 1;
+                return end(RunStatus::finished, "the crack's way ends here");
+            }
             const bool parted = carries_nothing(next, now);
             const bool left = walk_.station(next).left || parted;
             if (next > i + 1 || left || critical_[next] <= now) {
-                const Moment after = jump(next, now);
-                add(after, true);
-                here = after;
-                if (beyond_length(after)) return end(RunStatus::finished, "a stop condition was met");
+                jump(next, now, here);
+                if (done_) return;
                 if (parted) return end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more");
                 if (left) return split();
             }
@@ -218,8 +226,8 @@ class Tracer {
         return rest;
     }
 
-    // Where a jump at a load ends: between the last station that needs no more load and the first that does.
-    Moment jump(std::size_t next, double now) {
+    // A jump at a load ends between the last station that needs no more load and the first that does.
+    void jump(std::size_t next, double now, Moment& here) {
         Moment after = moment(next, now);
         const bool arrests = !walk_.station(next).left && critical_[next] > now;
         if (arrests && std::isfinite(critical_[next])) {
@@ -232,8 +240,10 @@ class Tracer {
             const double span = length_of(after) - length_of(before);
             after = mixed(before, after, std::clamp((*scene_.stop.crack_length - length_of(before)) / span, 0.0, 1.0));
         }
-        after.load.time = now + just_after * (std::isfinite(end_time()) ? end_time() : now);
-        return after;
+        after.load.time = now + just_after * (std::isfinite(end_time()) ? end_time() : now > 0.0 ? now : 1.0);
+        add(after, true);
+        here = after;
+        if (beyond_length(after) || beyond_displacement(after)) end(RunStatus::finished, met);
     }
 
     bool beyond_length(std::size_t i) const {
@@ -267,8 +277,7 @@ class Tracer {
              time = next_sample(time))
             add(mixed(from, to, (time - from.load.time) / span), false);
         add(mixed(from, to, stop), false);
-        if (stop < 1.0 || beyond_length(to) || beyond_displacement(to) || beyond_time(to))
-            end(RunStatus::finished, "a stop condition was met");
+        if (stop < 1.0 || beyond_length(to) || beyond_displacement(to) || beyond_time(to)) end(RunStatus::finished, met);
     }
 
     // The crack stands while the load rises, or until an equilibrium is missing.
@@ -396,6 +405,7 @@ class Tracer {
     Record record_;
     Moment last_;
     bool done_ = false;
+    bool runs_on_ = false;  // to where an equilibrium is missing
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;

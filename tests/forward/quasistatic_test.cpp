@@ -650,5 +650,29 @@ TEST(VerificationWalk, SmallStrainSaysHowMuchTurnsWouldChange) {
     EXPECT_EQ(finite.message.find("small strain"), std::string::npos);
 }
 
+// The load acts from the start, and nothing tells how long the run lasts: the crack has gone on to tough latewood all the same.
+TEST(UnitWalk, WhatALoadFromTheStartMakesGrowIsInTheSeries) {
+    Scene scene = at_equilibrium(ring_specimen(3e-3, 0.5e-3));
+    scene.materials["EW"].toughness = 1.0;
+    scene.materials["LW"].toughness = 1e6;
+    scene.edges[0].velocity = {};
+    scene.edges[0].traction = Vec2(0.0, 2e5);
+    scene.cracks[0] = straight({10e-3, 5e-3}, {7.8e-3, 5e-3}, 0.5e-3);
+    Stop& stop = scene.stop;
+    stop = {.displacement = {}, .crack_length = {}, .time = 1.0};
+    const Instant there = simulate(scene).series.back();
+    ASSERT_GT(there.crack_length, 2.6e-3);
+    stop = {.displacement = 1.0, .crack_length = {}, .time = {}};
+    const Record endless = simulate(scene);
+    std::printf("crack of 2.2 mm, under load %.3f mm; %s\n", 1e3 * there.crack_length, endless.message.c_str());
+    EXPECT_DOUBLE_EQ(endless.series.back().crack_length, there.crack_length);
+    EXPECT_DOUBLE_EQ(endless.series.back().G, there.G);
+    EXPECT_EQ(endless.series.size(), 2u);
+    stop = {.displacement = {}, .crack_length = 2.5e-3, .time = {}};
+    EXPECT_NEAR(simulate(scene).series.back().crack_length, 2.5e-3, 1e-9);
+    stop = {.displacement = 0.5 * endless.series[0].displacement, .crack_length = {}, .time = {}};
+    EXPECT_EQ(simulate(scene).series.size(), 1u) << "the load alone goes farther";
+}
+
 }  // namespace
 }  // namespace crampfit::test
