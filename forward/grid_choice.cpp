@@ -184,9 +184,13 @@ GridChoice choose_grid(const Scene& scene, double error) {
                            coarsest, most_cells_tried));
     if (chosen > most_cells_chosen)
         refuse(scene, error,
-               fmt::format("{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell",
-                           most_cells_chosen, 100 * worst_of(estimates, most_cells_chosen).at(most_cells_chosen),
-                           worst_of(estimates, most_cells_chosen).name));
+               fmt::format(
+                   "{:g} cells across would not meet it ({:.2g} % of {}): ask for less, or give model.cell{}", most_cells_chosen,
+                   100 * worst_of(estimates, most_cells_chosen).at(most_cells_chosen),
+                   worst_of(estimates, most_cells_chosen).name,
+                   std::ranges::any_of(scene.cracks, [](const Crack& c) { return c.grows != Growth::none && c.advance == 0.0; })
+                       ? ", or an advance to a crack that grows through rings without one"
+                       : ""));
     const Estimate& worst = worst_of(estimates, chosen);
     GridChoice choice;
     choice.cell = scene.specimen.size.minCoeff() / chosen;

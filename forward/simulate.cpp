@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace crampfit {
 
@@ -253,6 +254,20 @@ void judge_held_sides(const Scene& scene, Record& record) {
     }
 }
 
+// Says so where nothing resists, as where an edge has been forgotten: there is no force to compare with anything.
+void judge_support(const Discretisation& body, Record& record) {
+    constexpr double none = 1e-10;  // of the energy of wood that is strained by all of the displacement over its size
+    const Instant& last = record.series.back();
+    double softest = std::numeric_limits<double>::infinity();
+    for (int p = 0; p < body.points.count(); ++p) softest = std::min(softest, body.points.stiffest(p));
+    const Vec2 size = body.layout.size();
+    const double nominal = softest * size.prod() * body.layout.thickness * std::pow(last.displacement / size.maxCoeff(), 2);
+    double largest = 0.0;
+    for (const Instant& row : record.series) largest = std::max(largest, std::abs(row.strain_energy));
+    if (nominal > 0.0 && largest < none * nominal)
+        record.message += "; nothing resists the load: the specimen moves as a whole, or nothing touches it (edges, bodies)";
+}
+
 // Says so where the energy books do not close, as they do to a hundredth on any scene that the grid resolves.
 void judge_books(Record& record) {
     constexpr double counts = 0.05;
@@ -355,6 +370,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
     for (const Plan::Choice& choice : plan.choices)
         if (choice.warns) record.message += fmt::format("; {}: {}", choice.part, choice.choice);
     judge_long_advance(scene, body, record);
+    if (plan.quasistatic) judge_support(body, record);
     end_at_sides(scene, record);
     judge_held_sides(scene, record);
     record.scene_text = scene.text;

@@ -674,5 +674,16 @@ TEST(UnitWalk, WhatALoadFromTheStartMakesGrowIsInTheSeries) {
     EXPECT_EQ(simulate(scene).series.size(), 1u) << "the load alone goes farther";
 }
 
+TEST(UnitWalk, SaysSoWhereNothingResists) {
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
+    scene.edges = {moving("top", Side::top, {0.0, 1e-3})};  // holds the specimen by itself, and takes it along
+    scene.measure = {"top", "top"};
+    scene.stop = {.displacement = 1e-3, .crack_length = {}, .time = {}};
+    const auto says_so = [&] { return simulate(scene).message.find("nothing resists") != std::string::npos; };
+    EXPECT_TRUE(says_so());
+    scene.edges.push_back(moving("bottom", Side::bottom, {0.0, 0.0}));
+    EXPECT_FALSE(says_so());
+}
+
 }  // namespace
 }  // namespace crampfit::test
