@@ -254,6 +254,14 @@ void judge_held_sides(const Scene& scene, Record& record) {
     }
 }
 
+// Says so where a crack was drawn longer than it shall grow.
+void judge_stop(const Scene& scene, Record& record) {
+    const Instant& start = record.series.front();
+    if (scene.stop.crack_length && start.crack_length >= *scene.stop.crack_length)
+        record.message += fmt::format("; stop.crack_length = {:.4g} mm: the crack has {:.4g} mm from the start",
+                                      1e3 * *scene.stop.crack_length, 1e3 * start.crack_length);
+}
+
 // Says so where nothing resists, as where an edge has been forgotten: there is no force to compare with anything.
 void judge_support(const Discretisation& body, Record& record) {
     constexpr double none = 1e-10;  // of the energy of wood that is strained by all of the displacement over its size
@@ -369,6 +377,7 @@ Record simulate(const Scene& scene, const SimulateOptions& options) {
                                       : run_quasistatic(scene, plan, materials, body, options);
     for (const Plan::Choice& choice : plan.choices)
         if (choice.warns) record.message += fmt::format("; {}: {}", choice.part, choice.choice);
+    judge_stop(scene, record);
     judge_long_advance(scene, body, record);
     if (plan.quasistatic) judge_support(body, record);
     end_at_sides(scene, record);

@@ -288,7 +288,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.residuals = model.residuals(*best.evaluation);
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
         fit.distances = curve_distances(fit.residuals);
-        fit.message += lack_of_fit(fit.checks) + model.remarks();
+        fit.message += opposite_forces(fit.residuals) + lack_of_fit(fit.checks) + model.remarks();
         if (own) {
             fit.message +=
                 fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ",

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace crampfit {
 namespace {
@@ -60,6 +61,30 @@ std::string lack_of_fit(const std::vector<FitCheck>& checks) {
                 fmt::format("Lack of fit: the residuals of {} go together (autocorrelation {:.2f}, p = {:.1g}): the model, or "
                             "its grid, misses something there. ",
                             curve, check.autocorrelation, check.p_autocorrelation);
+        }
+    }
+    return text;
+}
+
+std::string opposite_forces(const std::vector<FitResidual>& residuals) {
+    constexpr double clearly = -0.5;  // cosine between both curves
+    struct Sums {
+        double product = 0, measured = 0, modelled = 0;
+    };
+    std::map<std::string, Sums> experiments;
+    for (const FitResidual& row : residuals) {
+        if (row.kind != "force") continue;
+        Sums& sums = experiments[row.experiment];
+        sums.product += row.measured * row.modelled;
+        sums.measured += row.measured * row.measured;
+        sums.modelled += row.modelled * row.modelled;
+    }
+    std::string text;
+    for (const auto& [name, sums] : experiments) {
+        if (sums.product < clearly * std::sqrt(sums.measured * sums.modelled)) {
+            text += fmt::format("The forces of '{}' have the other sign than the modelled ones, which are positive along the "
+                                "motion that they drive: turn the sign of the data. ",
+                                name);
         }
     }
     return text;

@@ -18,4 +18,7 @@ std::vector<FitCheck> check_fit(const std::vector<FitResidual>& residuals, int p
 /// said to be wrong.
 std::string lack_of_fit(const std::vector<FitCheck>& checks);
 
+/// Names experiments whose forces go against the modelled ones, as with a load cell of the other sign; empty when there is none.
+std::string opposite_forces(const std::vector<FitResidual>& residuals);
+
 }  // namespace crampfit

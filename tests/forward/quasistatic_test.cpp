@@ -685,5 +685,13 @@ TEST(UnitWalk, SaysSoWhereNothingResists) {
     EXPECT_FALSE(says_so());
 }
 
+TEST(UnitWalk, SaysSoWhereTheCrackIsLongerThanItShallGrow) {
+    Scene scene = at_equilibrium(ring_specimen(3e-3, 1e-3));
+    scene.stop = {.displacement = {}, .crack_length = 2e-3, .time = {}};
+    const Record record = simulate(scene);
+    EXPECT_EQ(record.series.size(), 1u);
+    EXPECT_NE(record.message.find("stop.crack_length = 2 mm: the crack has 3 mm"), std::string::npos) << record.message;
+}
+
 }  // namespace
 }  // namespace crampfit::test

@@ -237,6 +237,21 @@ TEST(VerificationLackOfFit, IsSeenWhereItIsAndSeldomWhereItIsNot) {
     EXPECT_GE(correlated, 480);
 }
 
+TEST(UnitLackOfFit, NamesForcesOfTheOtherSign) {
+    const auto rows = [](const std::string& experiment, double sign) {
+        std::vector<FitResidual> found;
+        for (int i = 1; i <= 10; ++i) found.push_back({experiment, "force", 0, sign * i, 0.2 * i + 0.1, 1, 0});
+        found.push_back({experiment, "arrival", 0, -1, 1, 1, 0});
+        return found;
+    };
+    std::vector<FitResidual> both = rows("right", 1.0);
+    EXPECT_EQ(opposite_forces(both), "");
+    const std::vector<FitResidual> wrong = rows("wrong", -1.0);
+    both.insert(both.end(), wrong.begin(), wrong.end());
+    EXPECT_NE(opposite_forces(both).find("'wrong'"), std::string::npos);
+    EXPECT_EQ(opposite_forces(both).find("'right'"), std::string::npos);
+}
+
 // Toughness falls along the crack in truth, and is two-valued in the fit.
 TEST(SystemLackOfFit, AWrongModelIsReportedAndARightOneIsNot) {
     struct Graded : FakeWedge {
