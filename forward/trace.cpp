@@ -73,7 +73,7 @@ class Tracer {
 
     Record run() {
         follow();
-        if (!walk_.failure().empty()) {
+        if (!walk_.failure().empty() && record_.message != met) {
             record_.status = RunStatus::unstable;
             record_.message = walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "");
         }
@@ -138,7 +138,7 @@ class Tracer {
                 } else if (i > 0) {
                     jump(i, now, here);
                 }
-                if (done_) return;
+                if (done_ || !walk_.failure().empty()) return;
                 if (walk_.station(i).split()) return split();
                 return end(RunStatus::finished,
                            std::isfinite(end_time())   ? met
@@ -161,13 +161,15 @@ class Tracer {
             // Over all that needs no more load.
             std::size_t next = i + 1;
             bool known = know_station(next, now);
-            while (known && !walk_.station(next).left && critical_[next] <= now && !beyond_length(next)) {
+            while (known && !walk_.station(next).left && critical_[next] <= now && !beyond_length(next) &&
+                   !beyond_displacement(next, now)) {
                 if (go_on_ && !go_on_(now, walk_.station(next).lengths[std::max(0, tracked_.crack)]))
                     return end(RunStatus::interrupted, "stopped by the user");
                 known = know_station(++next, now);
             }
             if (!known) {
                 if (next > i + 1) jump(next - 1, now, here);
+                if (done_) return;
                 runs_on_ = next > i + 1;
                 return end(RunStatus::finished, "the crack's way ends here");
             }
@@ -235,10 +237,15 @@ class Tracer {
                 critical_[next - 1] = walk_.critical(next - 1, materials_, now, true).time;
             const double s = (now - critical_[next - 1]) / (critical_[next] - critical_[next - 1]);
             after = mixed(moment(next - 1, now), after, std::clamp(s, 0.0, 1.0));
-        } else if (beyond_length(after) && length_of(after) > *scene_.stop.crack_length) {
+        } else if (beyond_length(after) || beyond_displacement(after)) {
             const Moment before = moment(next - 1, now);
-            const double span = length_of(after) - length_of(before);
-            after = mixed(before, after, std::clamp((*scene_.stop.crack_length - length_of(before)) / span, 0.0, 1.0));
+            double share = 1.0;
+            const auto end_at = [&](double stop, double from, double to) {
+                if (to > from) share = std::min(share, std::clamp((stop - from) / (to - from), 0.0, 1.0));
+            };
+            if (beyond_length(after)) end_at(*scene_.stop.crack_length, length_of(before), length_of(after));
+            if (beyond_displacement(after)) end_at(*scene_.stop.displacement, before.load.displacement, after.load.displacement);
+            after = mixed(before, after, share);
         }
         after.load.time = now + just_after * (std::isfinite(end_time()) ? end_time() : now > 0.0 ? now : 1.0);
         add(after, true);
@@ -249,6 +256,10 @@ class Tracer {
     bool beyond_length(std::size_t i) const {
         return tracked_.crack >= 0 && scene_.stop.crack_length &&
                walk_.station(i).lengths[tracked_.crack] >= *scene_.stop.crack_length * (1.0 - 1e-9);
+    }
+    // Under a load that acts from the start; where scenes are not linear that is seen after the jump.
+    bool beyond_displacement(std::size_t i, double now) {
+        return plan_.linear && scene_.stop.displacement && beyond_displacement(moment(i, now));
     }
     double length_of(const Moment& m) const { return tracked_.crack < 0 ? 0.0 : m.lengths[tracked_.crack]; }
     bool beyond_length(const Moment& m) const {

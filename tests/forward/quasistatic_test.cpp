@@ -672,6 +672,14 @@ TEST(UnitWalk, WhatALoadFromTheStartMakesGrowIsInTheSeries) {
     EXPECT_NEAR(simulate(scene).series.back().crack_length, 2.5e-3, 1e-9);
     stop = {.displacement = 0.5 * endless.series[0].displacement, .crack_length = {}, .time = {}};
     EXPECT_EQ(simulate(scene).series.size(), 1u) << "the load alone goes farther";
+    // Where nothing arrests it the crack runs to where no equilibrium is found, past the stop.
+    scene.materials["LW"].toughness = 1.0;
+    const double at_start = endless.series[0].displacement;
+    stop = {.displacement = 2 * at_start, .crack_length = {}, .time = {}};
+    const Record stopped = simulate(scene);
+    EXPECT_EQ(stopped.status, RunStatus::finished) << stopped.message;
+    EXPECT_NEAR(stopped.series.back().displacement, 2 * at_start, 1e-9 * at_start);
+    EXPECT_GT(stopped.series.back().crack_length, there.crack_length);
 }
 
 TEST(UnitWalk, SaysSoWhereNothingResists) {
