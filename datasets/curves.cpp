@@ -129,7 +129,7 @@ void read_row(std::string_view line, std::size_t number, const std::vector<Colum
 Curves read_curves(const std::filesystem::path& file) {
     const std::string text = read_text(file);
     if (text.find('\0') != std::string::npos) {
-        throw InputError(file.string(), "", "", "is no text");
+        throw InputError(file.string(), "", "", "is no text: columns of numbers as CSV are needed");
     }
     Curves curves;
     std::vector<Column> columns;

@@ -217,6 +217,9 @@ Output read_output(const Entry& entry) {
 Scene parse_scene(const std::string& text, const std::filesystem::path& file, const Overrides& overrides) {
     const Document document(text, file, overrides);
     const Entry root = document.root();
+    if (const auto experiments = root.find("experiments")) {
+        experiments->fail("is a key of a study, for `crampfit fit` and `sensitivity`: a scene is needed");
+    }
     root.only({"title", "model", "specimen", "materials", "edges", "bodies", "cracks", "measure", "solver", "stop", "output"});
     Scene scene;
     scene.file = file;

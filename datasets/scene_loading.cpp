@@ -17,7 +17,7 @@ Meeting read_meeting(const Entry& entry, const Choices<typename Meeting::Kind>& 
         meeting.kind = Meeting::Kind::friction;
         meeting.coefficient = entry.at("friction").number(limits::friction);
     } else {
-        meeting.kind = entry.choice(words);
+        meeting.kind = entry.choice(words, "{ friction = 0.3 }");
     }
     return meeting;
 }

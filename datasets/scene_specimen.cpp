@@ -35,11 +35,8 @@ Polygon read_polygon(const Entry& entry) {
     if (const std::size_t i = repeated_point(polygon.points, true); i < polygon.points.size()) {
         entry.fail(fmt::format("point {} repeats its neighbour; a polygon closes by itself", i));
     }
-    if (!(area(polygon.points) > 0)) {
-        entry.fail("a polygon must have an area");
-    }
-    if (crosses_itself(polygon.points, true)) {
-        entry.fail("a polygon must not cross or touch itself");
+    if (!(area(polygon.points) > 0) || crosses_itself(polygon.points, true)) {
+        entry.fail("a polygon must have an area and must not cross or touch itself");
     }
     return polygon;
 }

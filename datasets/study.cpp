@@ -255,6 +255,9 @@ Study read_study(const std::filesystem::path& file, const Overrides& overrides) 
     const SplitOverrides split = split_overrides(overrides);
     const Document document(read_text(file), file, split.study);
     const Entry root = document.root();
+    if (const auto specimen = root.find("specimen")) {
+        specimen->fail("is a key of a scene: a study is needed, which names the scenes of its experiments");
+    }
     root.only(study_keys);
     Study study;
     study.file = file;

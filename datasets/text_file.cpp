@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
@@ -24,6 +25,9 @@ std::string read_text(const std::filesystem::path& file) {
     std::string content = std::move(text).str();
     if (content.starts_with("\xEF\xBB\xBF")) {
         content.erase(0, 3);
+    }
+    if (content.find('\n') == std::string::npos) {
+        std::ranges::replace(content, '\r', '\n');  // lines that end as on early Macs
     }
     if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF")) {
         throw InputError(file.string(), "", "", "is UTF-16 text: save it as UTF-8");

@@ -170,8 +170,9 @@ void Entry::fail(const std::string& rule) const {
     throw InputError(place.file, place.key, value, rule);
 }
 
-void Entry::fail_choice(const std::string& word, const std::vector<std::string>& words) const {
-    fail(fmt::format("must be one of \"{}\"{}", fmt::join(words, "\", \""), suggestion(word, words)));
+void Entry::fail_choice(const std::string& word, const std::vector<std::string>& words, const std::string& or_else) const {
+    fail(fmt::format("must be one of \"{}\"{}{}", fmt::join(words, "\", \""), or_else.empty() ? "" : ", or " + or_else,
+                     suggestion(word, words)));
 }
 
 const toml::table& Entry::table() const {
@@ -223,7 +224,7 @@ std::string Entry::text() const {
 bool Entry::boolean() const {
     const auto value = node_->value_exact<bool>();
     if (!value) {
-        fail("must be true or false");
+        fail(is_text() ? "must be true or false, without quotes" : "must be true or false");
     }
     return *value;
 }
@@ -231,7 +232,7 @@ bool Entry::boolean() const {
 int Entry::integer(int low, int high) const {
     const auto value = node_->value_exact<std::int64_t>();
     if (!value || *value < low || *value > high) {
-        fail(fmt::format("must be a whole number from {} to {}", low, high));
+        fail(fmt::format("must be a whole number from {} to {}{}", low, high, is_text() ? ", without quotes" : ""));
     }
     return static_cast<int>(*value);
 }

@@ -81,7 +81,7 @@ class Entry {
     Vec2 point() const;                           // [m]
     std::filesystem::path existing_file() const;  // relative to the document's folder
     template <class T>
-    T choice(const Choices<T>& choices) const;
+    T choice(const Choices<T>& choices, const std::string& or_else = "") const;  // what else it may be, for the error
 
   private:
     friend class Document;
@@ -91,7 +91,8 @@ class Entry {
     const toml::table& table() const;
     std::string written() const;
     std::pair<Place, std::string> origin() const;  // where it was set, and the value as written there
-    [[noreturn]] void fail_choice(const std::string& word, const std::vector<std::string>& words) const;
+    [[noreturn]] void fail_choice(const std::string& word, const std::vector<std::string>& words,
+                                  const std::string& or_else) const;
 
     const Document* document_;
     const toml::node* node_;  // null: absent, for the error about it
@@ -100,7 +101,7 @@ class Entry {
 };
 
 template <class T>
-T Entry::choice(const Choices<T>& choices) const {
+T Entry::choice(const Choices<T>& choices, const std::string& or_else) const {
     const std::string word = text();
     std::vector<std::string> words;
     for (const auto& [name, value] : choices) {
@@ -109,7 +110,7 @@ T Entry::choice(const Choices<T>& choices) const {
         }
         words.push_back(name);
     }
-    fail_choice(word, words);
+    fail_choice(word, words, or_else);
 }
 
 }  // namespace crampfit

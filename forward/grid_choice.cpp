@@ -28,7 +28,11 @@ constexpr int multiple = 4;      // of cells: places on lines of the grids tried
 constexpr double safety = 1.25;  // Roache's, for three grids
 constexpr double least_power = 0.5;
 constexpr double most_power = 2.0;
-constexpr double power_of_time = 3.0;  // of cells to a side: cells times stations or factorisation
+
+// Time as a power of the cells to a side, as the two finest grids tried show it: between what little grids cost anyway, and cells
+// times stations or factorisation.
+constexpr double least_power_of_time = 1.0;
+constexpr double most_power_of_time = 3.0;
 
 struct Quantity {
     std::string name;
@@ -145,11 +149,19 @@ double fewest_cells(const std::vector<Estimate>& estimates, double asked, double
     throw InputError(scene.file.string(), "model.error", fmt::format("{:g} %", 100 * error), rule);
 }
 
+Plan plan_of(const Scene& scene) {
+    const MaterialMap materials(scene);
+    return make_plan(scene, materials, Discretisation(scene, materials));
+}
+
+double seconds_on(const Scene& scene, double cells, const Trial& middle, const Trial& fine) {
+    const double power = std::clamp(std::log2(fine.seconds / middle.seconds), least_power_of_time, most_power_of_time);
+    const double own = fine.seconds * std::pow(cells / fine.cells, power);
+    return plan_of(with_cells(scene, cells)).extrapolates ? own * (1.0 + std::pow(0.5, power)) : own;
+}
+
 void require_equilibrium(const Scene& scene, double error) {
-    const Scene coarse = with_cells(scene, 2 * cells_of_coarsest);
-    const MaterialMap materials(coarse);
-    const Discretisation body(coarse, materials);
-    if (!make_plan(coarse, materials, body).quasistatic)
+    if (!plan_of(with_cells(scene, 2 * cells_of_coarsest)).quasistatic)
         refuse(scene, error,
                "the cell is chosen at equilibrium only; explicit dynamics has errors of time and inertia too: give model.cell");
 }
@@ -196,7 +208,7 @@ GridChoice choose_grid(const Scene& scene, double error) {
     choice.cell = scene.specimen.size.minCoeff() / chosen;
     choice.error = worst.at(chosen);
     choice.quantity = worst.name;
-    choice.seconds = trials.back().seconds * std::pow(chosen / trials.back().cells, power_of_time);
+    choice.seconds = seconds_on(scene, chosen, trials[trials.size() - 2], trials.back());
     choice.seconds_spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     choice.text = fmt::format(
         "{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "

@@ -73,7 +73,7 @@ class Tracer {
 
     Record run() {
         follow();
-        if (!walk_.failure().empty() && record_.message != met) {
+        if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
             record_.status = RunStatus::unstable;
             record_.message = walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "");
         }
@@ -171,6 +171,8 @@ class Tracer {
                 if (next > i + 1) jump(next - 1, now, here);
                 if (done_) return;
                 runs_on_ = next > i + 1;
+                if (runs_on_ && plan_.linear)  // there is one wherever something holds
+                    return end(RunStatus::split, "the crack runs on at a constant load until nothing holds the specimen together");
                 return end(RunStatus::finished, "the crack's way ends here");
             }
             const bool parted = carries_nothing(next, now);

@@ -680,6 +680,9 @@ TEST(UnitWalk, WhatALoadFromTheStartMakesGrowIsInTheSeries) {
     EXPECT_EQ(stopped.status, RunStatus::finished) << stopped.message;
     EXPECT_NEAR(stopped.series.back().displacement, 2 * at_start, 1e-9 * at_start);
     EXPECT_GT(stopped.series.back().crack_length, there.crack_length);
+    stop = {.displacement = {}, .crack_length = {}, .time = 1.0};
+    const Record through = simulate(scene);
+    EXPECT_EQ(through.status, RunStatus::split) << through.message;
 }
 
 TEST(UnitWalk, SaysSoWhereNothingResists) {
