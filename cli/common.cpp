@@ -5,6 +5,7 @@
 #include "datasets/whole_file.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -17,6 +18,14 @@ namespace crampfit::cli {
 namespace {
 
 constexpr int most_threads = 4096;  // more is a slip of the finger
+
+/// By what they are, or where they will be.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+    std::error_code error;
+    return !a.empty() && !b.empty() &&
+           (std::filesystem::equivalent(a, b, error) ||
+            std::filesystem::weakly_canonical(a, error) == std::filesystem::weakly_canonical(b, error));
+}
 
 }  // namespace
 
@@ -47,10 +56,13 @@ Overrides overrides_of(const CommonOptions& common) {
 void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs,
                   const std::string& option) {
     if (output.empty()) throw InputError("command line", option, "", "must be the name of a file");
-    std::error_code neither_exists;
     for (const std::filesystem::path& input : inputs)
-        if (std::filesystem::equivalent(output, input, neither_exists))
-            throw InputError("command line", option, output.string(), "must not be a file that is read");
+        if (is_same_file(output, input))
+            throw InputError("command line", option, output.string(), "must not be a file that is read or made otherwise");
+    for (const auto& sink : spdlog::default_logger()->sinks())
+        if (const auto log = std::dynamic_pointer_cast<spdlog::sinks::basic_file_sink_mt>(sink))
+            if (is_same_file(output, log->filename()))
+                throw InputError("command line", option, output.string(), "must not be the log");
     require_writable(output);
 }
 
@@ -64,7 +76,7 @@ std::vector<std::filesystem::path> files_of(const Study& study) {
     std::vector<std::filesystem::path> files;
     for (const Experiment& experiment : study.experiments) {
         files.push_back(experiment.data_file);
-        if (experiment.fields) files.push_back(experiment.fields->file);
+        if (const auto& fields = experiment.fields) files.insert(files.end(), {fields->file, fields->times_file});
         if (const auto& photograph = experiment.photograph) files.insert(files.end(), {photograph->file, photograph->track});
     }
     for (const Scene* scene : scenes_of(study))

@@ -15,7 +15,7 @@ namespace crampfit::cli {
 namespace {
 
 ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, const CommonOptions& common) {
-    check_series(pictures, common);
+    check_series(pictures, times, common);
     const std::optional<double> pixel = pixel_of(pictures);
     const Correlator correlator = make_correlator(pictures, common);
     const FinePicture reference = read_reference(pictures);

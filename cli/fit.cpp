@@ -76,9 +76,9 @@ ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& co
         serve(arguments, common, ranks);
         return ExitStatus::done;
     }
-    check_output(arguments.output, {arguments.study});
+    check_outputs(arguments, {arguments.study});
     const Study study = open_study(arguments.study, common);
-    check_output(arguments.output, files_of(study));
+    check_outputs(arguments, files_of(study));
     const Fit fit = run(study, arguments, common, ranks);
     write(fit, arguments.output);
     double of_runs = 0;

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <csignal>
 #include <fcntl.h>
+#include <fstream>
 #include <new>
 #include <unistd.h>
 
@@ -17,15 +18,21 @@ namespace crampfit::cli {
 
 namespace {
 
+/// Whether lines can be added without harm: to a file that is not there, or empty, or a log.
+bool may_take_lines(const std::filesystem::path& log) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(log, error)) return true;
+    std::ifstream in(log);
+    std::string time, level;
+    return !(in >> time) || (in >> level && (level == "info:" || level == "error:"));
+}
+
 /// From here on, what is logged goes to the file of --log.
 void start_log(const CommonOptions& common, const std::vector<std::string>& words) {
     if (common.log.empty()) return;
-    const auto is_log = [&](const std::string& word) {
-        std::error_code neither_exists;
-        return std::filesystem::equivalent(common.log, word, neither_exists);
-    };
-    if (std::ranges::count_if(words, is_log) > std::ranges::count(words, "--log"))
-        throw InputError("command line", "--log", common.log.string(), "must not be a file that is read or made");
+    if (!may_take_lines(common.log))
+        throw InputError("command line", "--log", common.log.string(),
+                         "must be a new file or an earlier log: this one has other things in it");
     if (const auto folder = common.log.parent_path(); !folder.empty() && !std::filesystem::is_directory(folder))
         throw InputError("command line", "--log", common.log.string(),
                          fmt::format("the folder '{}' does not exist", folder.string()));

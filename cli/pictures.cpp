@@ -44,14 +44,15 @@ void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string
         ->type_name("M.png");
 }
 
-void check_series(const PictureSeries& series, const CommonOptions& common) {
+void check_series(const PictureSeries& series, const PictureTimes& times, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override here: options say it all");
     std::vector<std::filesystem::path> read = series.images;
-    read.insert(read.end(), {series.reference, series.mask});
+    read.insert(read.end(), {series.reference, series.mask, times.times, times.load});
     check_output(series.output, read);
     series.options.validate();
     if (!series.preview.empty()) {
+        read.push_back(series.output);
         check_output(series.preview, read, "--preview");
         require_picture_name(series.preview, "--preview");
     }

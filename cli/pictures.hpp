@@ -1,6 +1,7 @@
 #pragma once
 
 #include "cli/common.hpp"
+#include "cli/picture_times.hpp"
 #include "imaging/correlate.hpp"
 
 #include <filesystem>
@@ -26,7 +27,7 @@ void add_picture_series(CLI::App& verb, PictureSeries& series, const std::string
 
 /// Throws InputError unless the results can be saved without harm to the pictures, options are right and --set is not
 /// there.
-void check_series(const PictureSeries& series, const CommonOptions& common);
+void check_series(const PictureSeries& series, const PictureTimes& times, const CommonOptions& common);
 
 /// Edge of a pixel, where it was told [m]. Throws InputError for one that is no length or not positive.
 std::optional<double> pixel_of(const PictureSeries& series);

@@ -104,9 +104,10 @@ void keep_memory() {
 ExitStatus segment_and_save(const SegmentArguments& arguments, const CommonOptions& common) {
     if (!common.settings.empty())
         throw InputError("command line", "--set", common.settings.front(), "has nothing to override in a picture");
-    const std::vector<std::filesystem::path> read{arguments.image, arguments.borders, arguments.density, arguments.direction};
+    std::vector<std::filesystem::path> read{arguments.image, arguments.borders, arguments.density, arguments.direction};
     check_output(arguments.output, read);
     if (!arguments.preview.empty()) {
+        read.push_back(arguments.output);
         check_output(arguments.preview, read, "--preview");
         check_preview_name(arguments.preview);
     }

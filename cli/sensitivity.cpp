@@ -55,9 +55,9 @@ ExitStatus study_and_save(const StudyArguments& arguments, const CommonOptions& 
         ranks.serve([&](int) { return output_function(open_study(arguments.study, common), &stop_requested()); });
         return ExitStatus::done;
     }
-    check_output(arguments.output, {arguments.study});
+    check_outputs(arguments, {arguments.study});
     const Study study = open_study(arguments.study, common);
-    check_output(arguments.output, files_of(study));
+    check_outputs(arguments, files_of(study));
     const Sensitivity sensitivity = run(study, arguments, common, ranks);
     write(sensitivity, arguments.output);
     report(common, fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,

@@ -14,6 +14,11 @@ void add_study_arguments(CLI::App& verb, StudyArguments& arguments, const char* 
     verb.add_flag("--resume", arguments.resume, "Go on from the runs that an earlier call has kept beside its output");
 }
 
+void check_outputs(const StudyArguments& arguments, const std::vector<std::filesystem::path>& inputs) {
+    check_output(arguments.output, inputs);
+    check_output(arguments.runs(), inputs);
+}
+
 Study open_study(const std::filesystem::path& file, const CommonOptions& common) {
     Study study = read_study(file, overrides_of(common));
     load_pictures(study);

@@ -18,10 +18,15 @@ struct StudyArguments {
     std::filesystem::path study;
     std::filesystem::path output;
     bool resume = false;
+
+    std::filesystem::path runs() const { return output.string() + ".runs"; }
 };
 
 /// Adds them to a verb; `result` is what its output is called.
 void add_study_arguments(CLI::App& verb, StudyArguments& arguments, const char* result);
+
+/// Throws InputError unless the result, and the runs beside it, can be saved without harm to what is read.
+void check_outputs(const StudyArguments& arguments, const std::vector<std::filesystem::path>& inputs);
 
 /// Reads the study and the pictures of its scenes. From here on signals ask for a stop.
 Study open_study(const std::filesystem::path& file, const CommonOptions& common);
@@ -45,7 +50,7 @@ Options study_options(const StudyArguments& arguments, const CommonOptions& comm
     Options options;
     options.threads = common.threads;
     options.stop_requested = &stop_requested();
-    options.keeping = {arguments.output.string() + ".runs", arguments.resume};
+    options.keeping = {arguments.runs(), arguments.resume};
     options.farm = ranks.farm();
     return options;
 }

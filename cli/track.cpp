@@ -100,7 +100,7 @@ void keep_first(CrackTrack& track, std::size_t count) {
 
 ExitStatus track_and_save(const TrackArguments& arguments, const CommonOptions& common) {
     const PictureSeries& pictures = arguments.pictures;
-    check_series(pictures, common);
+    check_series(pictures, arguments.times, common);
     CrackTrack track = start_track(arguments, common);
     TipFinder find_tip(pictures, arguments.from, common);
     track.columns = find_tip.geometry().columns;

@@ -30,8 +30,9 @@ struct Noise {
 /// the mean over a subset of pixels, which counts as a square.
 struct MeasuredFields {
     std::filesystem::path file;
-    std::vector<Vec2> places;      // [points] middles of the subsets, undeformed [m]
-    std::vector<double> instants;  // [pictures] rising: times [s], or displacements of the loading [m]
+    std::filesystem::path times_file;  // of the pictures' instants; empty: the first has them
+    std::vector<Vec2> places;          // [points] middles of the subsets, undeformed [m]
+    std::vector<double> instants;      // [pictures] rising: times [s], or displacements of the loading [m]
     bool by_displacement = false;
     std::vector<std::vector<Vec2>> moved;    // [pictures][points] [m]; not a number where the point was lost
     std::vector<std::vector<double>> sigma;  // [pictures][points] standard error of each component [m]

@@ -21,7 +21,8 @@ void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields
     const auto table = entry.is_table() ? entry.find("times") : std::nullopt;
     Curves curves;
     if (table) {
-        curves = read_curves(table->existing_file());
+        fields.times_file = table->existing_file();
+        curves = read_curves(fields.times_file);
     } else {
         curves.time = series.time;
         curves.displacement = series.displacement;

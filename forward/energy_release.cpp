@@ -551,19 +551,19 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
         return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
     });
-    load.K_I = press ? 0.0 : std::max(0.0, K[0]);
-    load.K_II = K[1];
+    const Vec2 seen(press ? 0.0 : std::max(0.0, K[0]), K[1]);
+    load.K_I = seen[0];
+    load.K_II = seen[1];
     // Where J's domain cannot keep clear of other wood, but the tip lies in a cell of one wood, the near-tip field knows better:
     // it holds across boundaries, with a domain as wide as elsewhere. With the tip 4 cells off a boundary J, whose domain is
     // small then, is 3 % low, and K^2 / E' is within 0.4 % from 2 cells on (`VerificationBoundary`).
     // Beside a boundary J needs no gradient term and is as good as in one wood, and K means nothing on the boundary itself.
     if (extension.meets_other_wood && !J.beside_changes && in_one_wood(body, materials, tip.position)) {
         const Mat2 H = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction).release();
-        load.G = K.dot(H * K);
+        load.G = seen.dot(H * seen);
     } else if (options.sizes_K_by_J && options.rotates && !press && load.G > 0.0) {
         // The interaction integral sees all of its domain in one frame. Where that has turned much from end to end, as in thin
         // arms, it tells the modes apart, and J how large they are.
-        const Vec2 seen(load.K_I, load.K_II);
         const double told = seen.dot(field.release() * seen);
         const double size = told > 0.0 ? std::sqrt(load.G / told) : 1.0;
         load.K_I *= size;

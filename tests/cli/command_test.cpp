@@ -184,6 +184,26 @@ TEST(SystemCommand, LogIsAppendedWithTimes) {
     EXPECT_TRUE(contains(outcome.error, "--log")) << outcome.error;
 }
 
+TEST(SystemCommand, NeitherLogNorOutputTakesThePlaceOfOtherThings) {
+    Command command;
+    command.folder.write("scene.toml", small_scene);
+    const std::string scene = command.path("scene.toml"), made = command.path("made.h5");
+    command.folder.write("times.csv", "time [s]\n1\n");
+    const std::string times = command.path("times.csv"), picture = command.path("a.png");
+    for (const auto& words : {std::vector<std::string>{"explain", scene, "--log", scene},
+                              {"explain", scene, "--log", times},
+                              {"simulate", scene, "-o", made, "--log", made},
+                              {"track", picture, picture, "-o", times, "--times", times},
+                              {"correlate", picture, picture, "-o", times, "--times", times},
+                              {"track", picture, picture, "-o", command.path("new.png"), "--preview", command.path("new.png")}}) {
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2) << outcome.error;
+        EXPECT_TRUE(contains(outcome.error, "must ")) << outcome.error;
+    }
+    EXPECT_EQ(command.folder.read("scene.toml"), small_scene);
+    EXPECT_EQ(command.folder.read("times.csv"), "time [s]\n1\n");
+}
+
 TEST(SystemCommand, CsvRefusesUnknownTablesAndSettings) {
     Command command;
     write(Record{}, command.path("record.h5"));

@@ -102,7 +102,6 @@ TEST(SystemCommand, NoResultGoesOverAFileThatIsRead) {
     refused({"fit", study, "-o", scene}, "scene.toml");
     refused({"fit", study, "-o", command.path("data.csv")}, "data.csv");
     refused({"evaluate", study, command.path("params.in"), command.path("params.in")}, "params.in");
-    refused({"simulate", scene, "-o", command.path("r.h5"), "--log", scene}, "scene.toml");
 }
 
 TEST(SystemCommand, EvaluateGivesResidualsOrTheirSquaresSummed) {

@@ -45,6 +45,28 @@ TEST(UnitCrackFaces, PressedTogetherCarryAsAWholeBlock) {
     }
 }
 
+// Pressed along its normal a crack that ends in a band of latewood releases nothing, but for what the woods shear each other.
+TEST(UnitCrackFaces, ThatPressBesideOtherWoodReleaseNothing) {
+    double largest = 0.0;
+    for (const auto kind : {CrackFaces::Kind::frictionless, CrackFaces::Kind::stick})
+        for (const double tip : {6.2e-3, 7.2e-3, 7.4e-3}) {
+            Scene scene = at_equilibrium(block({10e-3, 8e-3}, 0.25e-3));
+            scene.specimen.material.clear();
+            scene.specimen.rings = Rings{Vec2(-1.0, 4e-3), 4e-3, 0.3, 0.0};  // latewood from 6.8 to 8 mm
+            scene.materials["LW"] = {1200e6, 0.33, 750.0, 100.0};
+            scene.edges = {moving("top", Side::top, {0.0, -1e-3}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.measure = {"top", "top"};
+            scene.stop = {.displacement = 0.2e-3, .crack_length = {}, .time = {}};
+            Crack crack;
+            crack.points = {Vec2(3e-3, 4e-3), Vec2(tip, 4e-3)};
+            crack.faces.kind = kind;
+            scene.cracks = {crack};
+            largest = std::max(largest, simulate(scene).series.back().G);
+        }
+    std::printf("pressed crack that ends beside or in latewood: G up to %.3f J/m^2\n", largest);
+    EXPECT_LT(largest, 1.0);
+}
+
 TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
     for (const double y : {5e-3, 5.5e-3}) {
         const Vec2 moved(0.2e-4, -1e-4);
