@@ -1,10 +1,12 @@
 #pragma once
 
+#include "datasets/error.hpp"
 #include "datasets/io.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,17 @@ Overrides overrides_of(const CommonOptions& common);
 /// Throws InputError unless a result can be saved there without harm to what is read.
 void check_output(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs,
                   const std::string& option = "-o");
+
+/// Writes a result where `check_output` had nothing against it. What fails now, as on a full disk, is no bad input: throws
+/// std::runtime_error.
+template <class Result>
+void save(const Result& result, const std::filesystem::path& output) {
+    try {
+        write(result, output);
+    } catch (const InputError& error) {
+        throw std::runtime_error(error.what());
+    }
+}
 
 /// The files that a scene, or a study and its scenes, are read from.
 std::vector<std::filesystem::path> files_of(const Scene& scene);

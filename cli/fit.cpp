@@ -80,7 +80,7 @@ ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& co
     const Study study = open_study(arguments.study, common);
     check_outputs(arguments, files_of(study));
     const Fit fit = run(study, arguments, common, ranks);
-    write(fit, arguments.output);
+    save(fit, arguments.output);
     double of_runs = 0;
     for (const auto& run : fit.runs) of_runs += run.seconds;
     for (const std::string& sentence : sentences(fit.message)) report(common, sentence);

@@ -72,9 +72,19 @@ ExitStatus end_of_reading(const CLI::App& command, const CLI::ParseError& end) {
     return ExitStatus::done;
 }
 
+/// An empty shell variable must not pass for an option left out.
+void refuse_empty(const CLI::App& command) {
+    for (const CLI::Option* option : command.get_options())
+        if (option->count() > 0 && option->get_type_size() > 0 && std::ranges::count(option->results(), "") > 0)
+            throw InputError("command line", option->get_name(), "\"\"", "must not be empty");
+}
+
 ExitStatus run_verb(const std::vector<Verb>& verbs) {
     for (const Verb& verb : verbs)
-        if (verb.arguments->parsed()) return verb.run();
+        if (verb.arguments->parsed()) {
+            refuse_empty(*verb.arguments);
+            return verb.run();
+        }
     throw std::logic_error("a command line without a verb was accepted");
 }
 
@@ -98,6 +108,7 @@ ExitStatus run_command(int argc, const char* const* argv) {
     } catch (const CLI::ParseError& end) {
         return end_of_reading(command, end);
     }
+    refuse_empty(command);
     start_log(common, {argv, argv + argc});
     return run_verb(verbs);
 }

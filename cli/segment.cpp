@@ -116,7 +116,7 @@ ExitStatus segment_and_save(const SegmentArguments& arguments, const CommonOptio
     options.threads = common.threads;
     const Segmentation result = segment(arguments.image, options);
     for (const std::string& note : result.notes) report(common, note);
-    write(result.specimen, arguments.output);
+    save(result.specimen, arguments.output);
     if (!arguments.preview.empty()) write_preview(arguments.image, result.specimen, arguments.preview);
     report(common, "saved as " + arguments.output.string());
     return ExitStatus::done;

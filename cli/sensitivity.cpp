@@ -59,7 +59,7 @@ ExitStatus study_and_save(const StudyArguments& arguments, const CommonOptions& 
     const Study study = open_study(arguments.study, common);
     check_outputs(arguments, files_of(study));
     const Sensitivity sensitivity = run(study, arguments, common, ranks);
-    write(sensitivity, arguments.output);
+    save(sensitivity, arguments.output);
     report(common, fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,
                                duration_text(sensitivity.seconds), arguments.output.string()));
     print(table_text(sensitivity));

@@ -51,7 +51,7 @@ ExitStatus simulate_and_save(const SimulateArguments& arguments, const CommonOpt
     stop_on_signals();
     spdlog::info("the scene is read");
     const Record record = run(scene, common);
-    write(record, arguments.output);
+    save(record, arguments.output);
     report(common, fmt::format("{}: {}; {} points, {} steps in {}, saved as {}", name(record.status), record.message,
                                record.points, record.steps, duration_text(record.seconds), arguments.output.string()));
     if (const double share = kinetic_share(record); share > quasistatic_share)

@@ -115,7 +115,7 @@ ExitStatus track_and_save(const TrackArguments& arguments, const CommonOptions& 
     }
     const int done = static_cast<int>(track.tips.size());
     keep_first(track, track.tips.size());
-    write(track, pictures.output);
+    save(track, pictures.output);
     if (!pictures.preview.empty() && done > 0) draw_track(read_image(pictures, done - 1), track.tips, pictures.preview);
     report(common,
            fmt::format(

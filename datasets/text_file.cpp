@@ -13,8 +13,11 @@ std::string read_text(const std::filesystem::path& file) {
     if (std::filesystem::is_directory(file, error)) {
         throw InputError(file.string(), "", "", "is a folder: a file is needed");
     }
-    if (!std::filesystem::is_regular_file(file, error)) {
+    if (!std::filesystem::exists(file, error)) {
         throw InputError(file.string(), "", "", "there is no such file");
+    }
+    if (!std::filesystem::is_regular_file(file, error) && !std::filesystem::is_fifo(file, error)) {
+        throw InputError(file.string(), "", "", "is neither a plain file nor a pipe");
     }
     std::ifstream in(file, std::ios::binary);
     std::ostringstream text;

@@ -316,6 +316,25 @@ double taken_by_faces(const std::vector<FacePiece>& pieces, const CrackFields& c
     return -sum / thickness;
 }
 
+// What the ties at the tip take of that where the wood changes along the way: they go along with the tip, and their energy with
+// the modulus that they are made for. Without it G in wood that gets stiffer was off with the first power of the cell.
+double taken_by_ties(const Discretisation& body, const CrackFields& cracks, const MaterialMap& materials, int crack, bool at_end,
+                     const Extension& extension, std::span<const double> ties) {
+    constexpr double step_in_cells = 0.1;
+    const CrackTip& tip = cracks.lines[crack].tip(at_end);
+    const Vec2 step = step_in_cells * body.layout.cell.minCoeff() * tip.direction;
+    double sum = 0.0;
+    for (std::size_t k = 0; k < ties.size(); ++k) {
+        const FieldPair& pair = cracks.pairs[k];
+        const double size = extension.size_at(pair.freed_at);
+        if (pair.crack != crack || ties[k] == 0.0 || size == 0.0) continue;
+        const auto modulus = [&](const Vec2& at) { return opening_modulus(materials, at, 0.5 * body.layout.cell, pair.along); };
+        const double behind = modulus(pair.freed_at - step), ahead = modulus(pair.freed_at + step);
+        sum += size * ties[k] * (ahead - behind) / (2.0 * step.norm() * pair.plane_modulus);
+    }
+    return -sum / body.layout.thickness;
+}
+
 // On the left of the crack, seen toward the tip. What lies on it counts as left of the way from start to end, as its fields do.
 bool is_left_of(const CrackLine& line, bool at_end, const Vec2& x) {
     double nearest = std::numeric_limits<double>::infinity();
@@ -542,6 +561,7 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const std::vector<FacePiece> pieces = face_pieces(cracks, crack, at_end, state.faces, body.layout);
     const Mat2 turn = options.rotates ? turn_about(body, tip, state.displacement) : Mat2(Mat2::Identity());
     load.G = J.G + taken_by_faces(pieces, cracks, crack, at_end, extension, state.displacement, turn, body.layout.thickness);
+    if (!body.points.changes.empty()) load.G += taken_by_ties(body, cracks, materials, crack, at_end, extension, state.ties);
     load.opening = turn.transpose() * opening_behind(body, cracks, crack, at_end, state.displacement);
 
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);

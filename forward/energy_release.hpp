@@ -12,7 +12,8 @@ struct NodalState {
     const std::vector<Vec2>& displacement;  // [m]
     const std::vector<Vec2>& velocity;      // [m/s]
     const std::vector<Vec2>& acceleration;  // [m/s^2]
-    std::span<const Vec2> faces = {};  // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
+    std::span<const double> ties = {};  // [pairs of fields] energy of what holds them together at a tip [J]; empty: nothing does
+    std::span<const Vec2> faces = {};   // [pairs of fields] what pressed crack faces put on the left one [N]; empty: none press
 };
 
 struct TipLoad {

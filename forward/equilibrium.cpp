@@ -595,7 +595,10 @@ TipLoad Equilibrium::load_at(int crack, bool at_end, const std::vector<Vec2>& di
     EnergyReleaseOptions options;
     options.rotates = options.sizes_K_by_J = plan_.rotates;
     const std::vector<Vec2> still(displacement.size(), Vec2::Zero());
-    TipLoad load = tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, face_forces()}, options);
+    std::vector<double> ties;
+    for (const FieldPair& pair : cracks_.pairs)
+        ties.push_back(0.5 * tie_of(pair) * (displacement[pair.left] - displacement[pair.right]).squaredNorm());
+    TipLoad load = tip_load(body_, cracks_, materials, crack, at_end, {displacement, still, still, ties, face_forces()}, options);
     if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
     return load;
 }

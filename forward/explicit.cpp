@@ -210,7 +210,8 @@ TipLoad ExplicitSolver::load_at(int crack, bool at_end) const {
     options.rotates = options.sizes_K_by_J = plan_.rotates;
     std::vector<Vec2> faces = face_force_;
     if (bridges_) bridges_->add_to(faces, normals_);
-    TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end, {displacement_, velocity_, acceleration_, faces}, options);
+    TipLoad load = tip_load(body_, cracks_, materials_, crack, at_end,
+                            {displacement_, velocity_, acceleration_, ties_.energies(cracks_, displacement_), faces}, options);
     if (history_) history_->forget_unknown(load, cracks_.lines[crack].tip(at_end).position, options);
     return load;
 }

@@ -550,19 +550,21 @@ Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average
 // wood.
 void MaterialMap::average_elasticity(const std::vector<LayeredElasticity>& samples, int side, const std::optional<Vec2>& normal,
                                      LayeredElasticity& mean) const {
-    constexpr double as_good_as_parallel = 0.02;  // sine of an angle; taken for straight its square is lost
+    constexpr double as_good_as_parallel = 0.01;  // sine of an angle from the middle one; taken for straight its square is lost
     const LayeredElasticity* first = nullptr;
     bool alike = true;
     Eigen::Matrix2d normals = Eigen::Matrix2d::Zero();
     for (const LayeredElasticity& wood : samples) {
         if (wood.coefficients[0] == 0.0) continue;
         if (!first) first = &wood;
-        alike = alike && wood.coefficients == first->coefficients &&
-                std::abs(cross(wood.normal, first->normal)) < as_good_as_parallel;
+        alike = alike && wood.coefficients == first->coefficients;
         normals += wood.normal * wood.normal.transpose();
     }
-    if (alike) {
-        mean = {first->coefficients, first_axis(normals)};
+    if (const Vec2 middle = first_axis(normals); alike && std::ranges::all_of(samples, [&](const LayeredElasticity& wood) {
+                                                     return wood.coefficients[0] == 0.0 ||
+                                                            std::abs(cross(wood.normal, middle)) < as_good_as_parallel;
+                                                 })) {
+        mean = {first->coefficients, middle};
         return;
     }
     std::vector<Eigen::Matrix3d> stiffness;

@@ -190,6 +190,12 @@ void check_cracks(const Scene& scene, const Discretisation& body) {
         };
         const bool start = crack.grows == Growth::start || crack.grows == Growth::both;
         const bool end = crack.grows == Growth::end || crack.grows == Growth::both;
+        // Its stations would have no end, and say what the grid does within a cell.
+        constexpr double least_advance = 1e-3;  // of a cell
+        if ((start || end) && crack.advance > 0.0 && crack.advance < least_advance * body.layout.cell.minCoeff())
+            refuse(scene, key + ".advance", fmt::format("{:.3g} mm", 1e3 * crack.advance),
+                   fmt::format("must be 0, for G at the tip, or more than a thousandth of a cell of {:.3g} mm",
+                               1e3 * body.layout.cell.minCoeff()));
         if ((start || end) && !(start && is_within(crack.points.front())) && !(end && is_within(crack.points.back())))
             refuse(scene, key + ".grows",
                    start && end ? "both"

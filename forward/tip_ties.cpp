@@ -108,19 +108,27 @@ void TipTies::pull(const CrackFields& cracks, const std::vector<Vec2>& displacem
     }
 }
 
+double TipTies::energy(const CrackFields& cracks, std::size_t k, const Motion& motion) const {
+    const FieldPair& pair = cracks.pairs[k];
+    const Tie& tie = ties_[k];
+    if (tie.waits) return 0.0;
+    const double f = share(tie, pair.freed);
+    const Vec2 here = jump_of(pair, motion.displacement) + tie.stretch;
+    const Vec2 rate = jump_of(pair, motion.velocity);
+    return 0.5 * stiffness(tie, f) * std::max(0.0, (here - motion.since * rate).dot(here + motion.until * rate)) -
+           (1.0 - f) * tie.held;
+}
+
 double TipTies::energy(const CrackFields& cracks, const Motion& motion) const {
     double sum = 0.0;
-    for (const std::size_t k : live_) {
-        const FieldPair& pair = cracks.pairs[k];
-        const Tie& tie = ties_[k];
-        if (tie.waits) continue;
-        const double f = share(tie, pair.freed);
-        const Vec2 here = jump_of(pair, motion.displacement) + tie.stretch;
-        const Vec2 rate = jump_of(pair, motion.velocity);
-        sum += 0.5 * stiffness(tie, f) * std::max(0.0, (here - motion.since * rate).dot(here + motion.until * rate));
-        sum -= (1.0 - f) * tie.held;
-    }
+    for (const std::size_t k : live_) sum += energy(cracks, k, motion);
     return sum;
+}
+
+std::vector<double> TipTies::energies(const CrackFields& cracks, const std::vector<Vec2>& displacement) const {
+    std::vector<double> found(cracks.pairs.size(), 0.0);
+    for (const std::size_t k : live_) found[k] = energy(cracks, k, Motion{displacement, displacement});
+    return found;
 }
 
 bool TipTies::is_of(const CrackFields& cracks, const FieldPair& pair, int crack, bool at_end) {

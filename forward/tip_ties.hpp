@@ -52,6 +52,9 @@ class TipTies {
         return energy(cracks, Motion{displacement, displacement});
     }
 
+    /// Of each pair of fields [J].
+    std::vector<double> energies(const CrackFields& cracks, const std::vector<Vec2>& displacement) const;
+
     /// The same as central differences have it [J]: over a step in which a tie's stiffness k changes, their energy changes by -
     /// dk/2 times the stretch at the next forces times that at the last.
     double energy(const CrackFields& cracks, const Motion& motion) const;
@@ -84,6 +87,7 @@ class TipTies {
         Vec2 stretch = Vec2::Zero();   // s c F0 less that jump [m]
         double held = 0;               // by the slack at the start, s c F0^2 / 2 [J]
     };
+    double energy(const CrackFields& cracks, std::size_t pair, const Motion& motion) const;
     double share(const Tie& tie, double freed) const;
     double stiffness(const Tie& tie, double f) const;
     double width(const CrackTip& tip) const;

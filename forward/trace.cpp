@@ -172,7 +172,8 @@ class Tracer {
                 if (done_) return;
                 runs_on_ = next > i + 1;
                 if (runs_on_ && plan_.linear)  // there is one wherever something holds
-                    return end(RunStatus::split, "the crack runs on at a constant load until nothing holds the specimen together");
+                    return end(RunStatus::split,
+                               "the crack runs on at a constant load until nothing holds the specimen together");
                 return end(RunStatus::finished, "the crack's way ends here");
             }
             const bool parted = carries_nothing(next, now);

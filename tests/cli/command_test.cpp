@@ -154,7 +154,7 @@ TEST(SystemCommand, ExplainPrints) {
 }
 
 TEST(SystemCommand, InterruptedRunIsSaved) {
-    for (const int signal : {SIGINT, SIGTERM}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         Command command;
         command.folder.write("scene.toml", endless_scene);
         command.start(
@@ -202,6 +202,26 @@ TEST(SystemCommand, NeitherLogNorOutputTakesThePlaceOfOtherThings) {
     }
     EXPECT_EQ(command.folder.read("scene.toml"), small_scene);
     EXPECT_EQ(command.folder.read("times.csv"), "time [s]\n1\n");
+}
+
+TEST(SystemCommand, AnEmptyOptionIsNotOneLeftOut) {
+    Command command;
+    command.folder.write("scene.toml", small_scene);
+    for (const auto& words : {std::vector<std::string>{"explain", command.path("scene.toml"), "--log", ""},
+                              {"segment", command.path("a.png"), "-o", command.path("a.h5"), "--borders", ""}}) {
+        const Outcome outcome = command.run(words);
+        EXPECT_EQ(outcome.status, 2);
+        EXPECT_TRUE(contains(outcome.error, "must not be empty")) << outcome.error;
+    }
+}
+
+TEST(SystemCommand, ASceneMayComeThroughAPipe) {
+    Command command;
+    command.folder.write("scene.toml", small_scene);
+    const std::string line =
+        "cat " + command.path("scene.toml") + " | " + COMMAND + " explain /dev/stdin >" + command.path("out.txt");
+    ASSERT_EQ(std::system(line.c_str()), 0);
+    EXPECT_TRUE(contains(command.folder.read("out.txt"), "explicit"));
 }
 
 TEST(SystemCommand, CsvRefusesUnknownTablesAndSettings) {

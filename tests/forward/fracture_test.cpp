@@ -156,6 +156,41 @@ TEST(VerificationEnergy, JIsTheChangeOfEnergyAmongRings) {
     }
 }
 
+// A tip midway in 2 mm of transition wood, across which the modulus grows thirtyfold, on ways along the grid and askew to it.
+// What the grid blurs about the tip goes with the modulus there: ties hold as much, and J takes it off.
+TEST(VerificationEnergy, JIsTheChangeOfEnergyInTransitionWood) {
+    const auto at_tip = [](double x, double slope, double cell) {
+        Scene scene = block({16e-3, 8e-3}, cell);
+        scene.specimen.material.clear();
+        scene.specimen.rings = Rings{Vec2(-1.0, 4e-3), 8e-3, 0.3, 2e-3};  // from 3.6 to 5.6 mm
+        scene.materials["LW"] = {1200e6, 0.33, 750.0, 100.0};
+        scene.edges = {moving("top", Side::top, {0.0, 1.0}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.measure = {"top", "top"};
+        scene.stop.time = 1e-4;
+        Crack crack;
+        crack.points = {Vec2(0.0, 4e-3 - slope * x), Vec2(x, 4e-3)};
+        scene.cracks = {crack};
+        return at_equilibrium(scene);
+    };
+    const auto energy = [&](double x) {
+        StaticTrial run(at_tip(x, 0.0, 0.0625e-3));
+        EXPECT_TRUE(run.solve(1e-4));
+        return run.equilibrium.potential() / run.scene.model.thickness;
+    };
+    const double middle = 4.625e-3, way = 0.0625e-3;
+    const double released = (energy(middle - way) - energy(middle + way)) / (2 * way);
+    for (const auto& [cell, bar] : {std::pair{0.25e-3, 0.03}, {0.125e-3, 0.02}, {0.0625e-3, 0.01}}) {
+        const double error = rate_at_rest(at_tip(middle, 0.0, cell), false) / released - 1;
+        std::printf("J in 2 mm of transition wood, cells of %.4f mm: %+.1f %% of the change of energy\n", 1e3 * cell,
+                    100 * error);
+        EXPECT_LT(std::abs(error), bar);
+    }
+    double rate[2];
+    for (const int fine : {0, 1}) rate[fine] = rate_at_rest(at_tip(4.6e-3, 0.15, fine ? 0.0625e-3 : 0.25e-3), false);
+    std::printf("the same askew, cells of 0.25 mm: %+.1f %% of J on cells of 0.0625 mm\n", 100 * (rate[0] / rate[1] - 1));
+    EXPECT_NEAR(rate[0], rate[1], 0.03 * rate[1]);
+}
+
 // What an edge crack of 8 mm, and a part of a cell, in a square of 16 mm holds between grips that let it go aside: its energy per
 // thickness [J/m], and its energy release rate.
 double energy_of_edge_crack(double cell, double nu, const Vec2& tip, double* rate = nullptr) {
