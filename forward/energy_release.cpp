@@ -578,12 +578,13 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     // it holds across boundaries, with a domain as wide as elsewhere. With the tip 4 cells off a boundary J, whose domain is
     // small then, is 3 % low, and K^2 / E' is within 0.4 % from 2 cells on (`VerificationBoundary`).
     // Beside a boundary J needs no gradient term and is as good as in one wood, and K means nothing on the boundary itself.
-    if (extension.meets_other_wood && !J.beside_changes && in_one_wood(body, materials, tip.position)) {
+    const bool runs_into_wood = extension.meets_other_wood && !J.beside_changes;
+    if (runs_into_wood && in_one_wood(body, materials, tip.position)) {
         const Mat2 H = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction).release();
         load.G = seen.dot(H * seen);
-    } else if (options.sizes_K_by_J && options.rotates && !press && load.G > 0.0) {
+    } else if ((runs_into_wood || (options.sizes_K_by_J && options.rotates)) && !press && load.G > 0.0) {
         // The interaction integral sees all of its domain in one frame. Where that has turned much from end to end, as in thin
-        // arms, it tells the modes apart, and J how large they are.
+        // arms, it tells the modes apart, and J how large they are. So too in transition wood, where it knows nothing of ties.
         const double told = seen.dot(field.release() * seen);
         const double size = told > 0.0 ? std::sqrt(load.G / told) : 1.0;
         load.K_I *= size;

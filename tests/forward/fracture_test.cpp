@@ -185,6 +185,11 @@ TEST(VerificationEnergy, JIsTheChangeOfEnergyInTransitionWood) {
                     100 * error);
         EXPECT_LT(std::abs(error), bar);
     }
+    StaticTrial run(at_tip(middle, 0.0, 0.25e-3));
+    EXPECT_TRUE(run.solve(1e-4));
+    const TipLoad load = run.equilibrium.load_at(0, true);
+    const LocalWood wood = run.materials.average(Vec2(middle, 4e-3), 0.5 * run.body.layout.point_size());
+    EXPECT_NEAR(load.K_I * load.K_I, load.G * wood.plane_modulus(), 0.01 * load.K_I * load.K_I);
     double rate[2];
     for (const int fine : {0, 1}) rate[fine] = rate_at_rest(at_tip(4.6e-3, 0.15, fine ? 0.0625e-3 : 0.25e-3), false);
     std::printf("the same askew, cells of 0.25 mm: %+.1f %% of J on cells of 0.0625 mm\n", 100 * (rate[0] / rate[1] - 1));
