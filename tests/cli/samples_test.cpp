@@ -1,8 +1,10 @@
 // The packaged samples, through the command.
+#include "datasets/io.hpp"
 #include "tests/cli/command.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <sstream>
@@ -55,6 +57,22 @@ TEST(SystemSamples, TensionCrackCrossesTheRingsFasterInLatewood) {
     const double late = length_in[1] / time_in[1];
     std::printf("TR+ at 10 m/s: crack at %.0f m/s in earlywood, %.0f m/s in latewood\n", early, late);
     EXPECT_GT(late, 1.2 * early);
+}
+
+// 0.3 mm of transition wood is less than a cell wide, and less than two.
+TEST(SystemSamples, WedgePeakHardlyDependsOnCellsThatTransitionWoodFitsInto) {
+    Command command;
+    double peak[2] = {0.0, 0.0};
+    for (const int fine : {0, 1}) {
+        const Outcome outcome = command.run({"simulate", SAMPLES "/wedge.toml", "-o", command.path("wedge.h5"), "--quiet",
+                                             "--set", fine ? "model.cell=0.17857 mm" : "model.cell=0.35714 mm", "--set",
+                                             "solver.extrapolate=false", "--set", "output.frames=0"});
+        ASSERT_EQ(outcome.status, 0) << outcome.error;
+        for (const crampfit::Instant& row : crampfit::read_record(command.path("wedge.h5")).series)
+            peak[fine] = std::max(peak[fine], row.force);
+    }
+    std::printf("wedge sample, peak on cells of 0.357 mm: %.2f N, of 0.179 mm: %.2f N\n", peak[0], peak[1]);
+    EXPECT_NEAR(peak[0], peak[1], 0.05 * peak[1]);
 }
 
 TEST(SystemSamples, AllScenesExplainThemselves) {
