@@ -115,7 +115,7 @@ RunJournal::RunJournal(const std::filesystem::path& file, std::uint64_t study, b
         if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
             throw InputError(file.string(), "", "", "another crampfit is at work on it");
         }
-        const std::string bytes = read_text(file);
+        const std::string bytes = read_bytes(file);
         // What is not ours, by the name or for the study, is not touched.
         if (!begins_as_ours(bytes)) {
             throw InputError(file.string(), "", "", "does not hold runs: another name is needed for -o");

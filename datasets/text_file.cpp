@@ -8,7 +8,7 @@
 
 namespace crampfit {
 
-std::string read_text(const std::filesystem::path& file) {
+std::string read_bytes(const std::filesystem::path& file) {
     std::error_code error;
     if (std::filesystem::is_directory(file, error)) {
         throw InputError(file.string(), "", "", "is a folder: a file is needed");
@@ -20,12 +20,16 @@ std::string read_text(const std::filesystem::path& file) {
         throw InputError(file.string(), "", "", "is neither a plain file nor a pipe");
     }
     std::ifstream in(file, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
+    std::ostringstream bytes;
+    bytes << in.rdbuf();
     if (!in) {
         throw InputError(file.string(), "", "", "the file cannot be read");
     }
-    std::string content = std::move(text).str();
+    return std::move(bytes).str();
+}
+
+std::string read_text(const std::filesystem::path& file) {
+    std::string content = read_bytes(file);
     if (content.starts_with("\xEF\xBB\xBF")) {
         content.erase(0, 3);
     }

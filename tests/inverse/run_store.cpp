@@ -1,6 +1,7 @@
 #include "inverse/run_store.hpp"
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "datasets/run_journal.hpp"
 #include "forward/simulate.hpp"
 #include "inverse/fit.hpp"
 #include "inverse/sensitivity.hpp"
@@ -230,6 +231,18 @@ TEST(UnitResume, RunsOfAnotherStudyAndOtherFilesAreRefused) {
     folder.write("fit.runs", "notes");  // as short as a head that a kill has torn
     EXPECT_THROW(fit_study(study, options), InputError);
     EXPECT_EQ(folder.read("fit.runs"), "notes");
+}
+
+TEST(SystemResume, RunsWhoseBytesWouldBeLineEndsOfATextAreReadBack) {
+    const TemporaryFolder folder;
+    for (const std::uint64_t byte : {0x0du, 0x0au, 0x1au, 0xffu}) {
+        const double number = std::bit_cast<double>(byte * 0x0101010101010101u);
+        { RunJournal(folder / "fit.runs", 1, false).add({{number}, {number, number}, "completed", number}); }
+        const RunJournal again(folder / "fit.runs", 1, true);
+        ASSERT_EQ(again.found().size(), 1u) << byte;
+        EXPECT_EQ(bits(again.found()[0].parameters.at(0)), bits(number)) << byte;
+        EXPECT_EQ(bits(again.found()[0].results.at(1)), bits(number)) << byte;
+    }
 }
 
 TEST(SystemResume, ASensitivityStudyGoesOn) {
