@@ -4,6 +4,8 @@
 #include "datasets/io.hpp"
 #include "imaging/gray_picture.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -197,10 +199,17 @@ void load_specimen(Scene& scene) {
         require_materials(scene, specimen, "specimen.classes");
         plan.map = std::make_shared<const Specimen>(std::move(specimen));
     } else if (!plan.file.empty()) {
-        Specimen specimen = read_specimen(plan.file);
+        const auto fail = [&](const std::string& rule) {
+            throw InputError(scene.file.string(), "specimen.file", plan.file.string(), rule);
+        };
+        Specimen specimen;
+        try {
+            specimen = read_specimen(plan.file);
+        } catch (const InputError& error) {
+            fail(error.key.empty() ? error.rule : fmt::format("{} = {}: {}", error.key, error.value, error.rule));
+        }
         if (!(specimen.pixel > 0)) {
-            throw InputError(scene.file.string(), "specimen.file", plan.file.string(),
-                             "has no scale: segment its picture again with --pixel");
+            fail("has no scale: segment its picture again with --pixel");
         }
         grade_by_density(scene, specimen);
         grade_transition(scene, specimen);

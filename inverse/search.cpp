@@ -41,7 +41,7 @@ void find_usable_start(Objective& objective, const Eigen::VectorXd& initial, uns
 // Local methods of NLopt take what stands for a failed run for the misfit there: a polynomial through it leads astray, and a
 // simplex may shrink before its time.
 bool is_misled(const Objective& objective, const Method& method) {
-    return method.name != "auto" && method.name != "ceres" && !is_global(method) &&
+    return method.name != "auto" && method.name != "ceres" &&
            std::any_of(objective.runs().begin(), objective.runs().end(),
                        [](const Run& run) { return !run.evaluation->usable(); });
 }
@@ -129,11 +129,29 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
     return result;
 }
 
+// A global method ends only with its runs: the last third of them is for the descent from the best that it has found.
+SearchResult search_the_box(Objective& objective, const Method& method, const Eigen::VectorXd& initial, const Stage& stage) {
+    std::string text;
+    if (!objective.best()) {  // or it has been searched
+        stage("search of the box");
+        Objective branch = objective.branch(objective.budget_left() - objective.budget_left() / 3, objective.threads());
+        minimize(branch, initial, method);
+        objective.join(branch);
+        text = fmt::format("{}, as asked, with {} runs, then ", method.name, branch.runs().size());
+    }
+    if (!objective.best()) {
+        return {false, text + "nothing: no run was usable."};
+    }
+    stage("descent");
+    const Solution solution = descend(objective, objective.best()->x, {"auto", method.seed});
+    text += "steps from the best run to the least misfit of polynomials fitted to the residuals of all runs nearby: ";
+    return {solution.converged, text + solution.message + "."};
+}
+
 SearchResult search_from_starts(Objective& objective, const Method& method, int starts, const Eigen::VectorXd& initial,
                                 const Stage& stage) {
     stage("descent");
-    const bool global = is_global(method);
-    const std::vector<Eigen::VectorXd> points = start_points(global ? 1 : starts, initial, method.seed);
+    const std::vector<Eigen::VectorXd> points = start_points(starts, initial, method.seed);
     const int count = static_cast<int>(points.size());
     // Shares of the budget, so that what one start does never depends on how far another has come.
     std::vector<Objective> branches;
@@ -146,11 +164,9 @@ SearchResult search_from_starts(Objective& objective, const Method& method, int 
         const auto k = static_cast<std::size_t>(i);
         Objective& branch = branches[k];
         Eigen::VectorXd start = points[k];
-        if (!global) {
-            branch.at(start);
-            find_usable_start(branch, initial, method.seed, count + i * most_failed_starts);
-            start = branch.best() ? branch.best()->x : start;
-        }
+        branch.at(start);
+        find_usable_start(branch, initial, method.seed, count + i * most_failed_starts);
+        start = branch.best() ? branch.best()->x : start;
         solutions[k] = descend(branch, start, method);
     });
     SearchResult result;
@@ -165,7 +181,7 @@ SearchResult search_from_starts(Objective& objective, const Method& method, int 
             message = solutions[k].message;
         }
     }
-    result.method = fmt::format("{}, as asked, from {} start{}: {}", method.name, count, count == 1 ? "" : "s",
+    result.method = fmt::format("{}, as asked, from {} start{}: {}.", method.name, count, count == 1 ? "" : "s",
                                 message.empty() ? "no run was usable" : message);
     return result;
 }
@@ -177,7 +193,9 @@ SearchResult search(Objective& objective, const OptimizerChoice& choice, const E
     if (choice.method == "auto") {
         return search_automatically(objective, choice.starts, initial, seed, stage);
     }
-    return search_from_starts(objective, {choice.method, seed}, choice.starts, initial, stage);
+    const Method method{choice.method, seed};
+    return is_global(method) ? search_the_box(objective, method, initial, stage)
+                             : search_from_starts(objective, method, choice.starts, initial, stage);
 }
 
 }  // namespace crampfit

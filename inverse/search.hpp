@@ -20,7 +20,8 @@ struct SearchResult {
 inline constexpr int least_starts_where_unexplained = 4;
 
 /// Searches the unit cube as a study asks: from `initial` and `starts - 1` further Sobol points of the box.
-/// Local methods descend from each of them, side by side; global ones have the box for themselves; `auto` runs each of
+/// Local methods descend from each of them, side by side; global ones have the box for themselves and two runs of three, the
+/// rest is for a descent from the best that they find (from the best at once where the objective has runs); `auto` runs each of
 /// them once, descends from the best, and from others only as long as the noise does not explain the misfit. `stage` is
 /// told what is going on.
 SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,

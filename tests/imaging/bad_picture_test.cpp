@@ -232,5 +232,7 @@ TEST(UnitBadPicture, ASceneIsNamedAsThePlaceOfTheKey) {
     scene.specimen.picture.reset();
     scene.specimen.file = folder / "specimen.h5";
     expect_scene_error("specimen.file", "LW");
+    scene.specimen.file = folder / "a.png";
+    expect_scene_error("specimen.file", "a.png");
     EXPECT_EQ(scene.specimen.map, nullptr);
 }

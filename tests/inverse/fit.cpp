@@ -232,6 +232,20 @@ INSTANTIATE_TEST_SUITE_P(SystemFit, EveryMethod,
                                            "mlsl"),
                          [](const auto& test) { return test.param; });
 
+TEST(SystemFit, GlobalMethodsConverge) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    study.optimizer.max_runs = 200;
+    for (const char* method : {"crs2", "isres", "direct", "mlsl"}) {
+        study.optimizer.method = method;
+        const Fit fit = fit_study(study, with(wedge, 2));
+        EXPECT_EQ(fit.status, FitStatus::converged) << method << ": " << fit.method;
+        EXPECT_LE(fit.runs.size(), 200u) << method;
+        EXPECT_NEAR(fit.parameters[0].value / true_earlywood, 1, 0.01) << method;
+        EXPECT_NEAR(fit.parameters[1].value / true_latewood, 1, 0.01) << method;
+    }
+}
+
 TEST(SystemFit, FailedRunsOfEveryKindAreRecordedAndTheFitGoesOn) {
     const FakeWedge wedge;
     const Study study = wedge_study(wedge, 0.02, 1e-4);
