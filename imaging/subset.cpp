@@ -142,6 +142,10 @@ FinePicture smooth(FinePicture picture, double radius) {
     return picture;
 }
 
+SplinePicture::Slopes smooth_slopes_of(const FinePicture& picture, double radius) {
+    return radius == 0 ? SplinePicture(picture).slopes() : SplinePicture(smooth(picture, radius)).slopes();
+}
+
 /// Spline values at `width` places: lane i lies (tx, ty) from the coefficient `at` + i.
 template <class Lanes>
 Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const Lanes& ty) {
@@ -166,9 +170,16 @@ Lanes interpolate(const float* at, std::ptrdiff_t stride, const Lanes& tx, const
 }  // namespace
 
 ReferencePicture::ReferencePicture(FinePicture fine, std::optional<double> smoothing)
-    : picture(std::move(fine)), slopes(SplinePicture(picture).slopes()), least_deviation(half_a_step(picture)) {
+    : picture(std::move(fine)), slopes(smooth_slopes_of(picture, 0)), least_deviation(half_a_step(picture)) {
     const double radius = smoothing ? *smoothing : smoothing_for(picture);
-    smooth_slopes = radius == 0 ? slopes : SplinePicture(smooth(picture, radius)).slopes();
+    smooth_slopes = smooth_slopes_of(picture, radius);
+
+    const int far = 10 + static_cast<int>(std::ceil(4 * radius)), size = 2 * far + 1;
+    FinePicture one_pixel{size, size, std::vector<float>(static_cast<std::size_t>(size * size), 0.0f)};
+    one_pixel.gray[static_cast<std::size_t>(far * size + far)] = 1.0f;
+    const std::vector<float> sharp = smooth_slopes_of(one_pixel, 0).by_x, soft = smooth_slopes_of(one_pixel, radius).by_x;
+    noise_in_tangent = std::inner_product(soft.begin(), soft.end(), sharp.begin(), 0.0);
+    noise_in_descent = std::inner_product(soft.begin(), soft.end(), soft.begin(), 0.0);
 }
 
 double smoothing_for(const FinePicture& picture) {
@@ -211,6 +222,16 @@ SubsetMatcher<Order>::SubsetMatcher(const ReferencePicture& reference, const Spl
     }
     for (std::vector<Lanes>* lanes : {&gray_, &by_x_, &by_y_, &smooth_by_x_, &smooth_by_y_}) lanes->assign(count, Lanes::Zero());
     sampled_.assign(blocks * width, 0.0f);
+    const auto moment = [this](std::size_t power) {
+        double sum = 0;
+        for (int i = -half_; i <= half_; ++i) sum += std::pow(static_cast<double>(i) / half_, static_cast<double>(power));
+        return sum;
+    };
+    for (std::size_t m = 0; m < terms; ++m)
+        for (std::size_t n = 0; n < terms; ++n) {
+            const auto i = static_cast<Eigen::Index>(m), j = static_cast<Eigen::Index>(n);
+            even_(i, j) = even_(terms + i, terms + j) = moment(powers[m][0] + powers[n][0]) * moment(powers[m][1] + powers[n][1]);
+        }
 }
 
 /// False when the subset is flat.
@@ -302,17 +323,24 @@ void SubsetMatcher<Order>::make_matrices() {
     descent_ = both(0);
     descent_by_gray_ = both(2);
     const double count = (2 * half_ + 1) * (2 * half_ + 1), squares = norm_ * norm_;
+    smooth_slope_ = (moments[0][0][0] + moments[3][0][0]) / (2 * count);
     tangent -= descent_ * both(4).transpose() / count + descent_by_gray_ * both(6).transpose() / squares;
     noise_ -= descent_ * descent_.transpose() / count + descent_by_gray_ * descent_by_gray_.transpose() / squares;
     tangent_.compute(tangent);
 }
 
 /// White noise of variance s^2 in what is left of the grays moves the parameters by covariance s^2 A^-1 B A^-T, A the
-/// tangent and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1.
+/// tangent and B the smooth descents by themselves; without smoothing both are the Hessian H, and it is s^2 H^-1. The reference's
+/// noise, half of s^2, is in its slopes, too: A is that without it, as it is not the image's; and of B the half that goes with
+/// the reference's own noise is, as slopes of noise times that noise add up to nothing.
 template <int Order>
 double SubsetMatcher<Order>::standard_error(double residual_variance) const {
-    const Square inverse = tangent_.inverse();
-    const auto variance = [&](int i) { return inverse.row(i).dot(inverse.row(i) * noise_); };
+    constexpr double most = 0.8;  // of the slopes, where what is left is more than noise
+    const double in_tangent = std::min(0.5 * residual_variance * reference_.noise_in_tangent, most * smooth_slope_);
+    const double in_descent = in_tangent * reference_.noise_in_descent / reference_.noise_in_tangent;
+    const Square inverse = (tangent_.reconstructedMatrix() - in_tangent * even_).inverse();
+    const Square descents = noise_ - 0.5 * in_descent * even_;
+    const auto variance = [&](int i) { return inverse.row(i).dot(inverse.row(i) * descents); };
     return std::sqrt(residual_variance * (variance(0) + variance(terms)) / 2);
 }
 

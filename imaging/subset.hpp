@@ -28,6 +28,9 @@ struct ReferencePicture {
     FinePicture picture;
     SplinePicture::Slopes slopes;
     SplinePicture::Slopes smooth_slopes;  // of the smoothed picture
+    // What noise of variance 1 in the gray adds to the mean of products along one axis [1/px^2].
+    double noise_in_tangent;  // of a smooth slope with a slope
+    double noise_in_descent;  // of a smooth slope with itself
     // Subsets whose gray has a smaller standard deviation are flat [gray]: half of the step between neighbouring grays, rounding
     // to which gives 0.29 of it. The step is 1 in pictures of 8 bits, and less in those of more.
     double least_deviation;
@@ -113,8 +116,10 @@ class SubsetMatcher {
     double slope_ = 0;                              // mean square of the reference's slope along x or y [gray^2/px^2]
     Parameters descent_;                            // sum of the smooth steepest descents
     Parameters descent_by_gray_;                    // sum of the smooth steepest descents times `gray_`
+    double smooth_slope_ = 0;                       // mean of the smooth slope times the slope, along x or y [gray^2/px^2]
     Eigen::PartialPivLU<Square> tangent_;           // smooth steepest descents by steepest descents
     Square noise_;                                  // smooth steepest descents by themselves
+    Square even_ = Square::Zero();                  // both where all slopes are 1 along x and along y, by themselves
 };
 
 extern template class SubsetMatcher<1>;

@@ -183,12 +183,12 @@ TEST(VerificationCorrelate, QuadraticFieldsUpToFivePercent) {
 
 // The standard error that a point tells of itself is that of the displacements' scatter, for white noise; and no unbiased
 // estimate from the same subsets scatters less than the bound of Cramer and Rao, which is met without smoothing and passed by
-// half with it: coarse features alone tell less. Where gray varies alike in all of the subset, the parabola's terms of a
-// second-order warp take 5 / 4 along x and 5 / 4 along y of what a first-order warp knows of the middle, so that its bound is
-// sqrt(3.5) = 1.87 times as high.
+// half with it: coarse features alone tell less. Strong noise is in the slopes, too, and passes it by more. Where gray varies
+// alike in all of the subset, the parabola's terms of a second-order warp take 5 / 4 along x and 5 / 4 along y of what a
+// first-order warp knows of the middle, so that its bound is sqrt(3.5) = 1.87 times as high.
 TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
     for (const int order : {1, 2})
-        for (const double noise : {1.0, 3.0}) {
+        for (const double noise : {1.0, order == 1 ? 12.0 : 3.0}) {
             VirtualCameraOptions camera_options;
             const FinePicture clean = fine(VirtualCamera({.noise = 0}).photograph(0));
             camera_options.noise = noise;
@@ -208,8 +208,9 @@ TEST(VerificationCorrelate, StandardErrorIsThatOfTheScatter) {
                             errors.sigma, bound);
                 // Interpolation hides a tenth of the noise, and adds some to the slopes.
                 EXPECT_NEAR(errors.sigma / errors.worst_displacement, 1.0, 0.15);
-                if (smoothing) {
-                    EXPECT_NEAR(errors.worst_displacement / bound, 1.0, 0.15);
+                EXPECT_GT(errors.worst_displacement / bound, 0.85);
+                if (smoothing && noise < 10) {
+                    EXPECT_LT(errors.worst_displacement / bound, 1.15);
                 }
             }
         }
