@@ -52,6 +52,24 @@ bool holds_node(const Shape& shape, const SpecimenPlan& specimen, const Vec2& x,
 
 }  // namespace
 
+bool meets_nodes(const Scene& scene, const Layout& layout) {
+    const auto any_node = [&](const auto& is_held) {
+        for (int n = 0; n < layout.nodes(); ++n)
+            if (is_held(layout.node_position(n))) return true;
+        return false;
+    };
+    return std::ranges::all_of(scene.edges,
+                               [&](const Edge& edge) {
+                                   return edge.traction || !edge.range || any_node([&](const Vec2& x) {
+                                              return on_side(layout, edge.side, x) && in_range(layout, edge, x);
+                                          });
+                               }) &&
+           std::ranges::all_of(scene.bodies, [&](const Body& grip) {
+               return grip.contact.kind != Contact::Kind::bonded ||
+                      any_node([&](const Vec2& x) { return holds_node(grip.shape, scene.specimen, x, layout.cell.minCoeff()); });
+           });
+}
+
 Gauges::Gauges(const Scene& scene) {
     const int edges = static_cast<int>(scene.edges.size());
     const auto driver_named = [&](const std::string& name) {

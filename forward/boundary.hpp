@@ -89,6 +89,9 @@ class Boundary {
     std::vector<Held> others_;  // of nodes: what else would hold them
 };
 
+/// Whether each stretch of a side that moves or stands, and each bonded body, has a node of such a grid to hold.
+bool meets_nodes(const Scene& scene, const Layout& layout);
+
 /// What is measured: which drivers, and along which directions.
 struct Gauges {
     explicit Gauges(const Scene& scene);

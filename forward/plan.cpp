@@ -1,6 +1,7 @@
 #include "forward/plan.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/boundary.hpp"
 #include "forward/bridging.hpp"
 #include "forward/bridging_check.hpp"
 #include "forward/contact.hpp"
@@ -425,14 +426,16 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const bool may_meet = plan.grows && scene.cracks.size() > 1;
     const bool may_extrapolate = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
     const bool resolved = may_extrapolate && resolves_woods(body);
-    plan.extrapolates = resolved && wide_cells_see_cracks(scene, materials, body);
+    const bool held = resolved && meets_nodes(scene, Layout::of(scene, 2.0 * body.layout.cell));
+    plan.extrapolates = held && wide_cells_see_cracks(scene, materials, body);
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
                : plan.remembers  ? "wood that remembers: errors of time and of the grid do not go together"
                : may_meet
                    ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
-               : resolved        ? "a second, twice as coarse, would have no wood beside a crack"
+               : held            ? "a second, twice as coarse, would have no wood beside a crack"
+               : resolved        ? "a second, twice as coarse, would have no node where an edge or a bonded body holds"
                : may_extrapolate ? "layers of the stiffest wood are less than two cells of a second, twice as coarse, wide: its "
                                    "error would not tell"
                : scene.solver.extrapolate

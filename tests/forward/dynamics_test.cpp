@@ -218,5 +218,20 @@ TEST(UnitPlan, ACrackBesideAGripIsForOneGrid) {
     }
 }
 
+// Wide cells of which no node lies on a short stretch would not hold it.
+TEST(UnitPlan, AStretchBetweenNodesOfWideCellsIsForOneGrid) {
+    for (const auto& [from, both] : {std::pair{5.2e-3, false}, std::pair{4.9e-3, true}}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.25e-3));
+        scene.edges = {moving("top", Side::top, {0.0, 1e-3}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.edges[1].range = {from, from + 0.25e-3};
+        scene.measure = {"top", "top"};
+        scene.stop.displacement = 1e-3;
+        const MaterialMap materials(scene);
+        const Discretisation body(scene, materials);
+        EXPECT_EQ(make_plan(scene, materials, body).extrapolates, both) << from;
+        EXPECT_NO_THROW(simulate(scene));
+    }
+}
+
 }  // namespace
 }  // namespace crampfit::test
