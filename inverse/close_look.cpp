@@ -184,7 +184,7 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
             below = *low * scale;
             above = *high * scale;
         } else {
-            constexpr double coarse = 0.1;  // of the window: twice the profile's steps
+            constexpr double coarse = 0.2;  // of the window: four of the profile's steps
             const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
             const double lowest = *std::min_element(profile.misfit.begin(), profile.misfit.end());
             if (is_confined(profile, way.window, lowest + level)) {

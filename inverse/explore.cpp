@@ -68,14 +68,16 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
             if (cheap && close) {
                 CloseLook::Along way = close->along(j);
                 way.objective.set_budget_left(runs_of_a_profile);
-                Profile profile = profile_likelihood(way.objective, way.best, 0, std::sqrt(way.covariance(0, 0)), rise);
+                const double half_width = uncertainty.quantile * std::sqrt(way.covariance(0, 0));
+                Profile profile = profile_likelihood(way.objective, way.best, 0, half_width, rise);
                 for (double& x : profile.x) {
                     x = std::clamp(way.window.origin[j] + x * way.window.axes(j, 0), 0.0, 1.0);
                 }
                 result.profiles.push_back(profile);
             } else {
                 model.set_budget_left(runs_of_a_profile);
-                result.profiles.push_back(profile_likelihood(model, best, j, std::sqrt(uncertainty.covariance(j, j)), rise));
+                const double half_width = uncertainty.quantile * std::sqrt(uncertainty.covariance(j, j));
+                result.profiles.push_back(profile_likelihood(model, best, j, half_width, rise));
             }
         }
     }

@@ -155,6 +155,23 @@ void fill_failure(Fit& fit, const UnitBox& box, const Objective& objective) {
                        : fmt::format("No run ended well; the first: {}. ", objective.runs().front().evaluation->status);
 }
 
+std::string contradicted_priors(const UnitBox& box, const Eigen::VectorXd& x) {
+    constexpr double far = 3;  // standard deviations
+    std::string text;
+    const Eigen::VectorXd values = box.values(x);
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        const double off = parameter.prior ? (values[j] - parameter.prior->mean) / parameter.prior->sd : 0.0;
+        if (std::abs(off) > far) {
+            text += fmt::format(
+                "The data and the prior of '{}' contradict each other: the fit lies {:.2g} standard deviations of the "
+                "prior {} its mean. ",
+                parameter.name, std::abs(off), off > 0 ? "above" : "below");
+        }
+    }
+    return text;
+}
+
 const char* explain(FitStatus status) {
     switch (status) {
     case FitStatus::converged:
@@ -288,7 +305,8 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.residuals = model.residuals(*best.evaluation);
         fit.checks = check_fit(fit.residuals, static_cast<int>(box.size()));
         fit.distances = curve_distances(fit.residuals);
-        fit.message += opposite_forces(fit.residuals) + lack_of_fit(fit.checks) + model.remarks();
+        fit.message +=
+            contradicted_priors(box, best.x) + opposite_forces(fit.residuals) + lack_of_fit(fit.checks) + model.remarks();
         if (own) {
             fit.message +=
                 fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ",

@@ -56,8 +56,8 @@ std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& star
 
 }  // namespace
 
-Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double standard_error, double rise) {
-    const double step = std::clamp(0.5 * standard_error, least_step, largest_step);
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise) {
+    const double step = std::clamp(0.25 * half_width, least_step, largest_step);
     Profile below, above;
     for (auto* side : {&below, &above}) {
         Eigen::VectorXd from = best.x, before = best.x;

@@ -18,11 +18,11 @@ struct Profile {
     std::vector<Eigen::VectorXd> lowest;  // where that is
 };
 
-/// The profile of parameter j about the best run, outwards in steps of about half a `standard_error` until the misfit has risen
-/// by `rise` or the bound is reached. Each point takes a descent of the others from where the one before ended; a point at which
-/// all runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence
-/// intervals, Applied Statistics 37.
-Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double standard_error, double rise);
+/// The profile of parameter j about the best run, outwards in steps of about a fourth of the `half_width` that its interval is
+/// expected to have, until the misfit has risen by `rise` or the bound is reached. Each point takes a descent of the others from
+/// where the one before ended; a point at which all runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing
+/// profile-likelihood-based confidence intervals, Applied Statistics 37.
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise);
 
 /// Where the profile comes up to `rise` above `least` below and above its lowest point: between two of its points as the square
 /// root of the rise goes, which is a straight line in a linear problem. A side that does not come up to it: its end's 0 or 1.

@@ -81,7 +81,7 @@ std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const 
 }
 
 SearchResult search_automatically(Objective& objective, int starts, const Eigen::VectorXd& initial, unsigned seed,
-                                  const Stage& stage) {
+                                  const std::function<bool(const Evaluation&)>& is_explained, const Stage& stage) {
     constexpr double explained = 1.3;  // reduced chi-square: as far above 1 as noise goes
     constexpr double unexplained = 4;  // residuals of two sigma
     const int p = static_cast<int>(initial.size());
@@ -113,11 +113,13 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
             result.converged = solution.converged;
         }
         ends += fmt::format(" Descent {}: {}.", i + 1, solution.message);
-        const double left = reduced_chi_square(*objective.best()->evaluation, p);
-        if (solution.converged && left < explained) {
+        const Evaluation& best = *objective.best()->evaluation;
+        const double left = reduced_chi_square(best, p);
+        const bool looks_like_noise = is_explained(best);
+        if (solution.converged && left < explained && looks_like_noise) {
             break;
         }
-        descents = left > unexplained ? std::max(starts, least_starts_where_unexplained) : starts;
+        descents = left > unexplained || !looks_like_noise ? std::max(starts, least_starts_where_unexplained) : starts;
     }
     result.method = fmt::format("auto: {} starting points side by side, then steps from the best of them to the least "
                                 "misfit (Ceres) of polynomials "
@@ -189,9 +191,9 @@ SearchResult search_from_starts(Objective& objective, const Method& method, int 
 }  // namespace
 
 SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,
-                    const Stage& stage) {
+                    const std::function<bool(const Evaluation&)>& is_explained, const Stage& stage) {
     if (choice.method == "auto") {
-        return search_automatically(objective, choice.starts, initial, seed, stage);
+        return search_automatically(objective, choice.starts, initial, seed, is_explained, stage);
     }
     const Method method{choice.method, seed};
     return is_global(method) ? search_the_box(objective, method, initial, stage)

@@ -24,7 +24,9 @@ inline constexpr int least_starts_where_unexplained = 4;
 /// rest is for a descent from the best that they find (from the best at once where the objective has runs); `auto` runs each of
 /// them once, descends from the best, and from others only as long as the noise does not explain the misfit. `stage` is
 /// told what is going on.
+/// `is_explained` says of the best run whether what it leaves looks like noise.
 SearchResult search(Objective& objective, const OptimizerChoice& choice, const Eigen::VectorXd& initial, unsigned seed,
+                    const std::function<bool(const Evaluation&)>& is_explained,
                     const std::function<void(const std::string&)>& stage);
 
 }  // namespace crampfit

@@ -100,7 +100,7 @@ double StudyModel::likely_resolution(const Evaluation& evaluation, double most) 
         return sum;
     };
     double likely = 0, lowest = deviance(0.0);
-    for (int i = 0; i <= steps; ++i) {
+    for (int i = 0; i <= steps && most > least; ++i) {
         const double resolution = least * std::pow(most / least, static_cast<double>(i) / steps);
         const double here = deviance(resolution);
         if (here < lowest) {
@@ -161,7 +161,7 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
     }
     for (Eigen::Index j = 0; j < box_.size(); ++j) {
         if (const auto& prior = box_.parameters()[static_cast<std::size_t>(j)].prior) {
-            residuals.push_back((values[j] - prior->mean) / prior->sd);
+            residuals.push_back(counts_priors_ ? (values[j] - prior->mean) / prior->sd : 0.0);
         }
     }
     evaluation.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));

@@ -39,6 +39,11 @@ class StudyModel {
     double resolution() const { return resolution_; }
     void set_resolution(double resolution);
 
+    /// Whether priors weigh, as they do unless told otherwise.
+    bool counts_priors() const { return counts_priors_; }
+    void count_priors(bool yes) { counts_priors_ = yes; }
+    bool has_priors() const { return residual_count() > station_count(); }
+
     /// The most by which another resolution would change the sigma of a measurement, as a part of it.
     double change_of_sigma(double resolution) const;
 
@@ -62,6 +67,7 @@ class StudyModel {
     std::vector<Experiment> tests_;      // with what runs can be compared with
     std::vector<std::string> left_out_;  // of the data, for a person
     double resolution_;
+    bool counts_priors_ = true;
     UnitBox box_;
     std::vector<Comparison> comparisons_;  // one an experiment
     SceneRuns runs_;

@@ -23,9 +23,15 @@ constexpr double least_change = 0.1;  // of a sigma, that they are made for
 
 // All that the lowest point of a cheap model hangs on beyond what the runs do.
 std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
-                            double resolution, double widening, unsigned seed) {
+                            const StudyModel& model, double widening, unsigned seed) {
     Fingerprint print;
-    print.add(point).add(resolution).add(rough).add(seed).add(static_cast<double>(study.optimizer.loss)).add(widening);
+    print.add(point)
+        .add(model.resolution())
+        .add(model.counts_priors())
+        .add(rough)
+        .add(seed)
+        .add(static_cast<double>(study.optimizer.loss))
+        .add(widening);
     print.add(std::vector<double>(window.origin.begin(), window.origin.end()));
     print.add(std::vector<double>(window.axes.reshaped().begin(), window.axes.reshaped().end()));
     for (const Parameter& parameter : study.parameters) {
@@ -77,6 +83,7 @@ Near StudyRuns::by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&
     return [this, runs](const Eigen::VectorXd& point) -> Objective::Evaluate {
         auto close =
             std::make_shared<StudyModel>(study_, (walks_.*runs)(values_at(point)), model_.resolution(), options_.stop_requested);
+        close->count_priors(model_.counts_priors());
         return [close, in_order = in_order_, threads = threads_](const Eigen::VectorXd& x, int share) {
             return close->evaluate(x, in_order ? threads : share);
         };
@@ -101,8 +108,7 @@ Eigen::VectorXd StudyRuns::key_of(const Eigen::VectorXd& values) const {
 // What an earlier process has done on walks that hang on one another is done again only where something goes on from them.
 Lowest StudyRuns::recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search) {
     const std::size_t n = store_.begin_search();
-    const std::uint64_t asked =
-        what_is_asked(study_, values_at(point), window, rough, model_.resolution(), widening_, options_.seed);
+    const std::uint64_t asked = what_is_asked(study_, values_at(point), window, rough, model_, widening_, options_.seed);
     if (const auto before = store_.found_by_search(n, asked)) {
         if (in_order_) {
             walks_.put_off(values_at(point), search);
@@ -137,7 +143,7 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
     const auto is_enough = [enough](const Evaluation& best) { return best.misfit < enough; };
     SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
-    found.converged = weigh_and_descend(found.converged, enough > 0);
+    found.converged = heed_data(weigh_and_descend(found.converged, enough > 0), [this] { return descend_again(); });
     if (!nearby_.turning.empty() && objective_.best()) {
         const bool is_fine = widening_ == 1.0, goes_on = starts == 1;  // from a search on wide cells
         for (const double reach : {all_ways, ways_about, ways_beside}) {
@@ -167,32 +173,49 @@ bool StudyRuns::descend_again() { return weigh_and_descend(descend_as_weighed(fa
 // From the best run on to the lowest point, or, but for the last time, to where a step says that runs weigh otherwise.
 bool StudyRuns::descend_as_weighed(bool last) {
     const auto weighs_otherwise = [this, last](const Evaluation& best) {
-        return !last && model_.change_of_sigma(model_.likely_resolution(best, solver_resolution)) > least_change;
+        return !last && model_.change_of_sigma(model_.likely_resolution(best, most_resolution_)) > least_change;
     };
     return crampfit::descend_again(objective_, nearby_, weighs_otherwise, options_.seed);
 }
 
 SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage) {
-    SearchResult found = crampfit::search(objective_, study_.optimizer, initial, options_.seed, stage);
-    OptimizerChoice again = study_.optimizer;
-    again.starts = 1;
-    const bool weighs = !options_.forward && walks_.at_equilibrium();
-    for (int round = 0; weighs && objective_.best() && round < most_weighings && weigh_anew(least_change); ++round) {
-        const Eigen::VectorXd best = objective_.best()->x;
-        const SearchResult next = crampfit::search(objective_, again, best, options_.seed, stage);
-        found.converged = next.converged;
-        found.method += " Weighed anew by what the model knows, from the best run on: " + next.method;
+    const auto is_explained = [this](const Evaluation& best) {
+        return lack_of_fit(check_fit(model_.residuals(best), static_cast<int>(model_.box().size()))).empty();
+    };
+    SearchResult found = crampfit::search(objective_, study_.optimizer, initial, options_.seed, is_explained, stage);
+    if (options_.forward || !walks_.at_equilibrium()) {
+        return found;
     }
+    const auto go_on = [&] {
+        OptimizerChoice again = study_.optimizer;
+        again.starts = 1;
+        const auto enough = [](const Evaluation&) { return true; };
+        const SearchResult next = crampfit::search(objective_, again, objective_.best()->x, options_.seed, enough, stage);
+        found.method += " Weighed anew by what the model knows, from the best run on: " + next.method;
+        return next.converged;
+    };
+    const auto weigh = [&](bool converged) {
+        for (int round = 0; objective_.best() && round < most_weighings && weigh_anew(least_change); ++round) {
+            converged = go_on();
+        }
+        return converged;
+    };
+    found.converged = heed_data(weigh(found.converged), [&] { return weigh(go_on()); });
     return found;
 }
 
 // Weighs all runs by what the best one says of the model's resolution, where that changes a sigma by more than so much.
 bool StudyRuns::weigh_anew(double least) {
-    const double likely = model_.likely_resolution(*objective_.best()->evaluation, solver_resolution);
+    const double likely = model_.likely_resolution(*objective_.best()->evaluation, most_resolution_);
     if (model_.change_of_sigma(likely) <= least) {
         return false;
     }
     model_.set_resolution(likely);
+    judge_runs();
+    return true;
+}
+
+void StudyRuns::judge_runs() {
     objective_.judge_anew([&](const Run& run) {
         Evaluation evaluation = *run.evaluation;
         model_.weigh(evaluation, model_.box().values(run.x));
@@ -201,7 +224,21 @@ bool StudyRuns::weigh_anew(double least) {
     if (on_weighing_) {
         on_weighing_(*objective_.best());
     }
-    return true;
+}
+
+// What the model knows is told by the data alone: where priors pull the best run off them, what is left would pass for an error
+// of the model's, by which the data weigh less, so that the priors pull the more.
+bool StudyRuns::heed_data(bool converged, const std::function<bool()>& descend) {
+    if (!converged || !model_.has_priors() || model_.change_of_sigma(0.0) <= least_change) {
+        return converged;
+    }
+    model_.count_priors(false);
+    judge_runs();
+    descend();
+    most_resolution_ = model_.resolution();
+    model_.count_priors(true);
+    judge_runs();
+    return descend();
 }
 
 // Whether more than noise is left, or hardly any: then the data may hold what another way would explain.

@@ -57,6 +57,8 @@ class StudyRuns {
     Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
     bool weigh_anew(double least_change);
+    void judge_runs();
+    bool heed_data(bool converged, const std::function<bool()>& descend);
     bool is_left_over() const;
     bool descend_as_weighed(bool last);
     bool weigh_and_descend(bool converged, bool ended_early);
@@ -73,6 +75,7 @@ class StudyRuns {
     bool has_walks_;
     bool by_walks_;
     bool in_order_;  // the same bits for any number of threads: runs that go on from one another are made one after the other
+    double most_resolution_ = solver_resolution;  // that the data leave open
     StudyModel model_;
     Nearby nearby_;
     Sharing shared_;

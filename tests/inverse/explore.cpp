@@ -87,7 +87,7 @@ TEST(VerificationProfile, IntervalsOfALinearProblemAreExact) {
     const crampfit::Run best{normal.mean, objective.at(normal.mean)};
     for (Eigen::Index j = 0; j < 2; ++j) {
         const double sd = std::sqrt(normal.covariance(j, j));
-        const Profile profile = profile_likelihood(objective, best, j, sd, 1.96 * 1.96);
+        const Profile profile = profile_likelihood(objective, best, j, 1.96 * sd, 1.96 * 1.96);
         const auto [lower, upper] = interval(profile, 0, 1.96 * 1.96);
         EXPECT_NEAR(lower, normal.mean[j] - 1.96 * sd, 1e-4 * sd);
         EXPECT_NEAR(upper, normal.mean[j] + 1.96 * sd, 1e-4 * sd);

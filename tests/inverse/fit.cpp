@@ -359,25 +359,43 @@ TEST(SystemFit, FlagsAParameterAtItsBound) {
     }
 }
 
-// A bar under tension, F = E w t u / L, whose data are the model's and noise: nothing is left for the model not to know, by no
+// A bar under tension, F = E w t u / L, of 350 MPa, whose data are the model's and noise.
+struct BarTest {
+    double information = 0;    // of the data on E [1/MPa^2]
+    double least_squares = 0;  // E by the data alone [MPa]
+
+    Study study() const { return study_; }
+
+    BarTest() {
+        Experiment experiment;
+        experiment.name = "bar";
+        experiment.scene = bar_scene();
+        std::mt19937 generator(1);
+        std::normal_distribution<double> normal(0.0, 2.0);
+        double sum = 0;
+        for (int i = 1; i <= 40; ++i) {
+            const double u = 0.1e-3 * i / 40, slope = 5e-3 * 1e6 * u;  // N/MPa
+            experiment.data.displacement.push_back(u);
+            experiment.data.force.push_back(350 * slope + normal(generator));
+            information += std::pow(slope / 2.0, 2);
+            sum += slope * experiment.data.force.back() / 4.0;
+        }
+        least_squares = sum / information;
+        experiment.noise.force = 2.0;
+        study_.experiments = {experiment};
+        study_.parameters = {bar_modulus()};
+    }
+
+  private:
+    Study study_;
+};
+
+// Nothing is left for the model not to know, by no
 // method, nor for those who drive the study themselves.
 TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
-    Study study;
-    Experiment experiment;
-    experiment.name = "bar";
-    experiment.scene = bar_scene();
-    std::mt19937 generator(1);
-    std::normal_distribution<double> normal(0.0, 2.0);
-    double information = 0;
-    for (int i = 1; i <= 40; ++i) {
-        const double u = 0.1e-3 * i / 40;
-        experiment.data.displacement.push_back(u);
-        experiment.data.force.push_back(5e-3 * 350e6 * u + normal(generator));
-        information += std::pow(5e-3 * 1e6 * u / 2.0, 2);  // of E in MPa
-    }
-    experiment.noise.force = 2.0;
-    study.experiments = {experiment};
-    study.parameters = {bar_modulus()};
+    const BarTest bar;
+    Study study = bar.study();
+    const double information = bar.information;
     FitOptions options;
     options.threads = 1;
     FitProgress last_told;
@@ -394,8 +412,30 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
     }
     const Evaluation there = fit_function(study)(Eigen::VectorXd::Constant(1, 380e6), 1);
     ASSERT_TRUE(there.usable());
-    const double last = experiment.data.force.back();
+    const double last = study.experiments[0].data.force.back();
     EXPECT_NEAR(there.residuals.tail(1)[0], (5e-3 * 380e6 * 0.1e-3 - last) / 2.0, 1e-6);
+}
+
+// What data and prior say together is their weighted mean, however far apart they are: the prior tells nothing of what the model
+// knows. Lack of fit widens what the data say; the interval holds the fit.
+TEST(SystemFit, APriorAgainstTheDataIsNoErrorOfTheModel) {
+    const BarTest bar;
+    const double error = 1 / std::sqrt(bar.information);
+    for (const char* method : {"auto", "bobyqa"}) {
+        Study study = bar.study();
+        study.optimizer.method = method;
+        study.uncertainty.profile = true;
+        study.parameters[0].prior = Prior{(bar.least_squares + 10 * error) * 1e6, 0.5 * error * 1e6};
+        FitOptions options;
+        options.threads = 1;
+        const Fit fit = fit_study(study, options);
+        EXPECT_EQ(fit.status, FitStatus::converged) << method;
+        const FittedParameter& E = fit.parameters[0];
+        EXPECT_NEAR((E.value - bar.least_squares) / error, 8, 0.1) << method;
+        EXPECT_NE(fit.message.find("contradict each other"), std::string::npos) << fit.message;
+        EXPECT_GT(E.lower_95, E.value - 20 * E.standard_error) << method;
+        EXPECT_LT(E.upper_95, E.value + 20 * E.standard_error) << method;
+    }
 }
 
 TEST(SystemFit, WeightsAndSeveralExperimentsAddUp) {

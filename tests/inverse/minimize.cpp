@@ -216,7 +216,8 @@ TEST_P(Methods, GoesOnWhenOneRunInFiveFails) {
     OptimizerChoice choice;
     choice.method = GetParam();
     choice.starts = 2;
-    search(objective, choice, Vector2d(0.12, 0.88), 5, [](const std::string&) {});
+    search(
+        objective, choice, Vector2d(0.12, 0.88), 5, [](const Evaluation&) { return true; }, [](const std::string&) {});
     int failed = 0;
     for (const auto& run : objective.runs()) {
         failed += run.evaluation->usable() ? 0 : 1;
@@ -268,7 +269,8 @@ TEST(UnitSearch, AutoLooksElsewhereWhileTheNoiseDoesNotExplainTheMisfit) {
         Objective objective(2, two_hollows, 500, 1);
         OptimizerChoice choice;
         choice.starts = starts;
-        search(objective, choice, Vector2d(0.2, 0.5), 1, [](const std::string&) {});
+        search(
+            objective, choice, Vector2d(0.2, 0.5), 1, [](const Evaluation&) { return true; }, [](const std::string&) {});
         EXPECT_NEAR(objective.best()->x[0], 0.8, 0.06) << starts;  // 0.2 leaves six sigma, so that one start is too few
     }
 }
