@@ -105,7 +105,7 @@ cv::Mat pick_by_length(const cv::Mat& mask, const cv::Mat& coordinate, const Wan
 /// Long dark patches whichever way they run. LW is long and dark, too, but not as much darker than LW is elsewhere. Nothing is
 /// smoothed: of a line of three pixels that would leave little.
 cv::Mat long_dark(const cv::Mat& gray, const WoodLevels& levels, double ring_width) {
-    return pick(gray < levels.latewood - dark_line * levels.contrast(), [&](const int* box) {
+    return pick(gray < levels.darkest - dark_line * levels.contrast(), [&](const int* box) {
         const double length = std::hypot(box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]);
         return length > std::max(8.0, 0.4 * ring_width) && box[cv::CC_STAT_AREA] < slender * length * length;
     });
@@ -264,7 +264,7 @@ cv::Mat find_ground(const cv::Mat& gray) {
 
 cv::Mat find_foreign(const WoodView& view) {
     const auto& [gray, bgr, around, coordinate, levels, width] = view;
-    const double contrast = levels.contrast(), dark = levels.latewood - too_dark * contrast;
+    const double contrast = levels.contrast(), dark = levels.darkest - too_dark * contrast;
     const cv::Mat hue = strange_hue(bgr, gray.size());
     cv::Mat smooth;
     cv::GaussianBlur(gray, smooth, {}, std::max(1.0, 0.06 * width));

@@ -33,7 +33,7 @@ cv::Mat find_ground(const cv::Mat& gray);
 /// - ray: the same, lighter by a third
 /// - resin canal: a round spot that is lighter by a third, up to a fifth of a ring wide
 /// - mark: other patches that are too dark, or blue or green: ink, holes, dirt
-/// Too dark is darker than LW by a quarter of the contrast.
+/// Too dark is darker than LW, where that is darkest, by a quarter of the contrast.
 cv::Mat find_foreign(const WoodView& view);
 
 /// 1 where a pixel is wood that counts (float): not foreign, and not right beside it.

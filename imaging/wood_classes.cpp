@@ -20,17 +20,37 @@ constexpr double dark_share = 0.03;       // of a ring, that is no brighter than
 constexpr double bright_share = 0.90;     // of a ring, that is no brighter than its bright wood
 constexpr double mixed = 1.5;             // pixels on either side of a border that show some of the other side
 
-/// Gray along the rings, each gap filled from a wider and wider stretch of its ring.
+/// Fills what is missing from the rows before and behind it, straight in between.
+void fill_across(cv::Mat& gray, const cv::Mat& missing) {
+    const auto gap = [&](int v, int u) { return missing.at<std::uint8_t>(v, u) != 0; };
+    for (int u = 0; u < gray.cols; ++u)
+        for (int v = 0; v < gray.rows; ++v) {
+            if (!gap(v, u)) continue;
+            int end = v;
+            while (end < gray.rows && gap(end, u)) ++end;
+            const float before = v > 0 ? gray.at<float>(v - 1, u) : end < gray.rows ? gray.at<float>(end, u) : 0;
+            const float behind = end < gray.rows ? gray.at<float>(end, u) : before;
+            for (int i = v; i < end; ++i)
+                gray.at<float>(i, u) = std::lerp(before, behind, static_cast<float>(i - v + 1) / static_cast<float>(end - v + 1));
+            v = end;
+        }
+}
+
+/// Gray along the rings, each gap filled from a wider and wider stretch of its ring, and what is left, as where a crack runs
+/// along a ring, from the wood on both sides of it.
 cv::Mat smooth_wood(const StraightWood& wood, const RingCoordinate& rings, double ring_width) {
-    cv::Mat smooth, missing;
+    constexpr double nothing = 1e-3;  // of the stretch: a narrow picture shows little of a long one
+    cv::Mat smooth, missing, unknown;
     for (const double along : {2.0, std::max(8.0, 0.5 * ring_width), std::max(32.0, 2 * ring_width)}) {
         const StraightPicture straight = wood.blurred_along(along);
         if (smooth.empty()) smooth = straight.gray;
         else straight.gray.copyTo(smooth, missing);
         // A place whose neighbours along the ring hardly count is still to be filled.
         missing = straight.known < 0.3;
+        unknown = straight.known < nothing;
         if (cv::countNonZero(missing) == 0) break;
     }
+    fill_across(smooth, unknown);
     return rings.bend(smooth);
 }
 
@@ -120,7 +140,9 @@ WoodLevels usual_range(const std::vector<RingLevels>& rings) {
             early.push_back(static_cast<float>(level.earlywood));
             late.push_back(static_cast<float>(level.latewood));
         }
-    return {quantile(early, 0.5), quantile(late, 0.5)};
+    // Rings differ in how dark their LW is. What one alone shows may be a crack.
+    const double darkest = std::clamp(1.5 / static_cast<double>(rings.size()), 0.1, 0.5);
+    return {quantile(early, 0.5), quantile(late, 0.5), quantile(late, darkest)};
 }
 
 /// Otsu's thresholds: those that make the variance between the classes largest. Values count from `low` to `high`.

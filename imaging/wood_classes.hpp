@@ -13,6 +13,7 @@ namespace crampfit {
 struct WoodLevels {
     double earlywood = 1;
     double latewood = 0;
+    double darkest = latewood;  // of a picture: LW of the rings where it is darkest
 
     double contrast() const { return earlywood - latewood; }
 };

@@ -186,6 +186,37 @@ TEST(UnitDrawnRings, FewWideRingsTellTheGrowthByTheirArcs) {
     }
 }
 
+// LW is not as dark in all rings: by 0.25 of its contrast (standard deviation) here. It is no void for that.
+TEST(UnitDrawnRings, LatewoodDiffersFromRingToRing) {
+    constexpr double darker[] = {0.1,  -0.3,  0.25, 0.0,  -0.2, 0.35,  -0.1, 0.3, -0.35,
+                                 0.15, -0.05, 0.2,  -0.4, 0.05, -0.15, 0.4,  0.0};
+    const auto gray = [&](double x, double) {
+        const double ring = std::floor(x / 40);
+        return x / 40 - ring < 0.75 ? 200.0 : 100 - 100 * darker[static_cast<int>(ring) % 17];
+    };
+    const Specimen specimen = segment_pixels(drawn({680, 200}, gray, 0.7, 3), {.growth = GrowthAxis::right}).specimen;
+    EXPECT_EQ(specimen.rings.size(), 15u);
+    for (const RingFigures& ring : specimen.rings) {
+        EXPECT_NEAR(ring.width, 40, 0.5) << ring.ring;
+        EXPECT_NEAR(ring.latewood_fraction, 0.25, 0.02) << ring.ring;
+    }
+    EXPECT_EQ(std::ranges::count(specimen.label, Specimen::void_label), 0);
+}
+
+// A crack in EW that runs along its ring, as in RT tests, hides EW: its ring has no more LW for it.
+TEST(UnitDrawnRings, ACrackAlongARingIsNoLatewood) {
+    for (const double width : {3.0, 8.0}) {
+        const auto gray = [width](double x, double) {
+            if (std::abs(x - 310) < width / 2) return 10.0;
+            return x / 50 - std::floor(x / 50) < 0.7 ? 190.0 : 90.0;
+        };
+        const Specimen specimen = segment_pixels(drawn({600, 200}, gray, 0.7, 3), {.growth = GrowthAxis::right}).specimen;
+        EXPECT_EQ(specimen.rings.size(), 10u) << width;
+        for (const RingFigures& ring : specimen.rings) EXPECT_NEAR(ring.latewood_fraction, 0.3, 0.02) << ring.ring;
+        EXPECT_NEAR(static_cast<double>(std::ranges::count(specimen.label, Specimen::void_label)) / 200, width, 2) << width;
+    }
+}
+
 // Strips much narrower than a ring, as a thin core shows them, along both axes.
 TEST(UnitDrawnRings, AStripNarrowerThanARing) {
     const auto gray = [](double x, double) { return x / 200 - std::floor(x / 200) < 0.7 ? 190.0 : 80.0; };
