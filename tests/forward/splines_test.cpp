@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -44,6 +45,35 @@ TEST(VerificationSplineCrack, BooksCloseWhileItGrows) {
     EXPECT_GT(record.series.back().crack_length, 6.9e-3);
     EXPECT_NEAR(record.series.back().fracture_energy, 100.0 * 4e-3, 0.1 * 100.0 * 4e-3);
     EXPECT_LT(record.worst_energy_imbalance, 0.1);
+}
+
+// Pulled slowly apart, with the tip anywhere in a cell and the crack on a line of the grid, a quarter and half a cell above it.
+TEST(VerificationSplineCrack, BeginsToGrowAtItsToughness) {
+    constexpr double cell = 0.25e-3;
+    for (const double lift : {0.0, 0.25, 0.5})
+        for (const double place : {0.0, 0.25, 0.5, 0.75}) {
+            Scene scene = block({10e-3, 10e-3}, cell);
+            scene.solver.kind = SolverKind::explicit_dynamics;
+            scene.solver.shape_function = ShapeFunction::bspline2;
+            scene.solver.damping = 2e4;
+            scene.edges = {moving("top", Side::top, {0.0, 0.5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            Crack crack;
+            crack.points = {Vec2(0.0, 5e-3 + lift * cell), Vec2(2.5e-3 + place * cell, 5e-3 + lift * cell)};
+            crack.grows = Growth::end;
+            crack.direction = GrowthDirection::straight;
+            scene.cracks = {crack};
+            scene.measure = {"top", "top"};
+            scene.stop.crack_length = crack.points[1].x() + 0.2 * cell;
+            scene.output.samples = 400;
+            const Record record = simulate(scene);
+            const double length = record.series.front().crack_length;
+            const auto grown = std::ranges::find_if(record.series, [&](const Instant& row) { return row.crack_length > length; });
+            ASSERT_NE(grown, record.series.end()) << record.message;
+            std::printf(
+                "B-splines, crack %.2f of a cell above nodes, tip %.2f behind one: begins to grow at G = %.1f J/m^2 of 100\n",
+                lift, place, std::prev(grown)->G);
+            EXPECT_NEAR(std::prev(grown)->G, 100, 6) << lift << " " << place;
+        }
 }
 
 TEST(VerificationSplines, BlockUnderTractionStrainsEvenly) {
