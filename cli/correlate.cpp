@@ -51,6 +51,8 @@ ExitStatus correlate(const PictureSeries& pictures, const PictureTimes& times, c
     if (!pictures.preview.empty() && last) draw_field(reference, series.lattice, *last, pictures.preview);
     report(common, fmt::format("{} of {} points in {} images followed, saved as {}", followed,
                                static_cast<long>(series.lattice.count()) * done, done, pictures.output.string()));
+    if (followed == 0 && done > 0)
+        report(common, "no point was followed: do the images show the reference's pattern? The points' status says why");
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 

@@ -54,7 +54,7 @@ class TipFinder {
 
   private:
     CrackTip counted(const CrackTip& by_gray) {
-        from_gray_ += by_gray.status == TipStatus::ok || by_gray.status == TipStatus::outside;
+        from_gray_ += by_gray.status == TipStatus::ok;
         return by_gray;
     }
 
@@ -122,6 +122,7 @@ ExitStatus track_and_save(const TrackArguments& arguments, const CommonOptions& 
                "tip found in {} of {} images{}, saved as {}", std::ranges::count(track.tips, TipStatus::ok, &CrackTip::status),
                done, find_tip.from_gray() > 0 ? fmt::format(", {} by the dark line that the crack is", find_tip.from_gray()) : "",
                pictures.output.string()));
+    if (!track.pixel) report(common, "the crack's length is not known without --pixel: its tip is in pixels");
     return done < count ? ExitStatus::interrupted : ExitStatus::done;
 }
 

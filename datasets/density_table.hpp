@@ -15,7 +15,7 @@ struct DensityTable {
 };
 
 /// Reads a table with the columns gray and density [kg/m^3], in any unit of density. Throws InputError for anything else, for
-/// fewer than two rows, and for grays that do not rise from row to row.
+/// fewer than two rows, for grays that do not rise from row to row, and for densities that rise and fall.
 DensityTable read_density_table(const std::filesystem::path& file);
 
 }  // namespace crampfit

@@ -83,6 +83,17 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
+std::string advice_on_holds(const Scene& scene) {
+    const bool slides =
+        std::ranges::all_of(scene.bodies, [](const Body& body) { return body.contact.kind == Contact::Kind::frictionless; });
+    const auto is_held = [&](int axis) {
+        return std::ranges::any_of(scene.edges, [axis](const Edge& edge) { return edge.velocity[axis].has_value(); });
+    };
+    return slides && !(is_held(0) && is_held(1))
+               ? "; along one axis frictionless bodies alone hold the specimen: hold it at an edge, or give one of them friction"
+               : "";
+}
+
 bool has_dead_load(const Scene& scene) {
     return std::ranges::any_of(scene.edges, [](const Edge& edge) { return edge.traction.has_value(); }) ||
            std::ranges::any_of(scene.bodies, [](const Body& rigid) { return !rigid.force.isZero(0.0); });

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <optional>
+#include <string>
 
 namespace crampfit {
 
@@ -31,6 +32,9 @@ double farthest_motion(const Scene& scene, double end);
 /// How far the edges of a strip go until a long crack runs through it, G = E eps^2 h (REFERENCES: strip) with the toughest wood's
 /// toughness and the softest wood's stiffness, and half as far again for arrests [m].
 double splitting_motion(const Scene& scene, const Discretisation& body);
+
+/// What to say besides where no equilibrium is found: that along some axis frictionless bodies alone hold the specimen; else empty.
+std::string advice_on_holds(const Scene& scene);
 
 /// Whether there is a traction, or a force on a body, which do not go with time.
 bool has_dead_load(const Scene& scene);

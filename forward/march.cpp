@@ -207,7 +207,7 @@ class March {
             throw InputError(scene_.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
         record_.status = RunStatus::unstable;
         record_.message = "no equilibrium was found at " + std::to_string(time) + " s" +
-                          (plastic ? "; the load may be more than the wood can carry" : "");
+                          (plastic ? "; the load may be more than the wood can carry" : "") + advice_on_holds(scene_);
         if (record_.series.empty()) save_row();
         return finish();
     }

@@ -32,6 +32,7 @@ constexpr std::size_t most_pixels = 1 << 26;  // some hundred bytes are needed f
 constexpr double glint = 1.25, usual_share = 0.999;
 constexpr double least_ring = 15, least_latewood = 4;  // pixels; narrower, and LW fractions are off by more than 2 %
 constexpr double most_void = 0.5;                      // of the picture: more is worth a warning
+constexpr double most_beyond = 0.01;                   // of the wood: a density table is short of so many of its grays
 
 /// Gray and colour as float, the brightest value 1, but for a few pixels.
 struct Pixels {
@@ -64,6 +65,13 @@ Pixels read_float(const std::filesystem::path& image, const PictureKey& key) {
 /// 255 where no specimen is photographed.
 cv::Mat blank_of(const Pixels& pixels) { return find_blank(pixels.gray, pixels.bgr) | find_ground(pixels.gray); }
 
+/// Across the rings; where there is no whole one, `along_growth` [pixels].
+double typical_width(const std::vector<RingFigures>& rings, double along_growth) {
+    std::vector<float> widths;
+    for (const RingFigures& ring : rings) widths.push_back(static_cast<float>(ring.width));
+    return rings.empty() ? along_growth : quantile(std::move(widths), 0.5);
+}
+
 /// Says where rings are too narrow for their LW fractions.
 void warn_of_narrow(const std::vector<RingFigures>& rings, std::vector<std::string>& notes) {
     std::vector<float> widths, late;
@@ -72,6 +80,14 @@ void warn_of_narrow(const std::vector<RingFigures>& rings, std::vector<std::stri
         late.push_back(static_cast<float>(ring.width * ring.latewood_fraction));
     }
     const double width = quantile(widths, 0.5), late_width = quantile(late, 0.5);
+    const auto narrow = std::ranges::count_if(rings, [](const RingFigures& ring) {
+        return ring.width < least_ring || ring.width * ring.latewood_fraction < least_latewood;
+    });
+    if (narrow > 0 && width >= least_ring && late_width >= least_latewood)
+        notes.push_back(
+            fmt::format("{} of {} rings are narrower than {:.0f} pixels or their LW than {:.0f}: their LW fractions are "
+                        "rough",
+                        narrow, rings.size(), least_ring, least_latewood));
     if (!rings.empty() && (width < least_ring || late_width < least_latewood))
         notes.push_back(fmt::format("rings are {:.1f} pixels wide and their LW {:.1f}, typically: LW fractions need {:.0f} and "
                                     "{:.0f}, take a finer picture",
@@ -350,11 +366,14 @@ void fill_density(Specimen& specimen, const std::filesystem::path& image, const 
     const FinePicture gray = read_fine_gray(image, {"command line", "IMAGE"});
     std::vector<double> sum(specimen.classes.size(), 0.0);
     std::vector<long> count(sum.size(), 0);
+    long wood = 0, beyond = 0;
     for (std::size_t i = 0; i < specimen.label.size(); ++i) {
         const std::uint8_t label = specimen.label[i];
         const double density = label == Specimen::void_label ? 0.0 : table.at(gray.gray[i]);
         specimen.density.push_back(static_cast<float>(density));
         if (label != Specimen::void_label) {
+            ++wood;
+            beyond += gray.gray[i] < table.gray.front() || gray.gray[i] > table.gray.back();
             sum[label] += density;
             ++count[label];
         }
@@ -363,6 +382,11 @@ void fill_density(Specimen& specimen, const std::filesystem::path& image, const 
         if (count[k] > 0)
             notes.push_back(fmt::format("density of {}: {:.0f} kg/m^3 on average", specimen.classes[k],
                                         sum[k] / static_cast<double>(count[k])));
+    if (const double share = static_cast<double>(beyond) / static_cast<double>(std::max(1l, wood)); share > most_beyond)
+        notes.push_back(
+            fmt::format("{:.0f} % of the wood has grays beyond the density table's, from {:.4g} to {:.4g}: taken for the "
+                        "nearest row's density",
+                        100 * share, table.gray.front(), table.gray.back()));
 }
 
 }  // namespace
@@ -444,7 +468,7 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     if (!second.obstacle.empty() && options.borders.empty()) result.notes.push_back(second.obstacle);
     result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
                                        specimen.borders.size(), options.borders.empty() ? "" : " as given", specimen.rings.size(),
-                                       second.ring_width));
+                                       typical_width(specimen.rings, second.ring_width)));
     warn_of_narrow(specimen.rings, result.notes);
     return result;
 }
