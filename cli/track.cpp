@@ -62,12 +62,13 @@ class TipFinder {
     bool prefer_gray(const CrackTip& tip, const CrackTip& by_gray, const DisplacementField& field) const {
         if (tip.status == TipStatus::too_few_points || by_gray.status == TipStatus::outside) return true;
         if (by_gray.status != TipStatus::ok) return false;
-        // The dark line's end is behind the tip where the crack's opening is too small to be seen: the two must agree.
-        if (tip.status == TipStatus::ok)
-            return by_gray.sigma < tip.sigma && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.sigma, tip.sigma);
+        if (tip.status == TipStatus::ok && by_gray.sigma >= tip.sigma) return false;
+        // The dark line's end is behind the tip where the crack's opening is too small to be seen: so near the two agree.
+        if (tip.status == TipStatus::ok && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.sigma, tip.sigma))
+            return true;
         // A line whose sides lie still is a shadow.
         const std::optional<double> apart = motion_apart(geometry_, field, by_gray);
-        return !apart || *apart > least_apart;
+        return apart ? *apart > least_apart : tip.status != TipStatus::ok;
     }
 
     Correlator correlator_;
