@@ -39,7 +39,7 @@ void add_common_options(CLI::App& command, CommonOptions& common) {
                     "Forward runs side by side in a fit, or threads in a step of explicit dynamics; all cores unless told")
         ->type_name("N")
         ->check(CLI::Range(1, most_threads));
-    command.add_flag("--quiet", common.quiet, "No progress on standard error");
+    command.add_flag("--quiet", common.quiet, "No progress on standard error, only errors");
     command.add_option("--log", common.log, "Append what happens, with the time, to this file")->type_name("FILE");
 }
 
@@ -95,6 +95,11 @@ void print(const std::string& text) {
 void report(const CommonOptions& common, const std::string& line) {
     spdlog::info(line);
     if (!common.quiet) complain(line);
+}
+
+void report_end(const CommonOptions& common, const std::string& line, ExitStatus status) {
+    spdlog::info(line);
+    if (!common.quiet || status != ExitStatus::done) complain(line);
 }
 
 }  // namespace crampfit::cli

@@ -62,4 +62,7 @@ void print(const std::string& text);
 /// A line on standard error, unless --quiet, and in the log.
 void report(const CommonOptions& common, const std::string& line);
 
+/// How something has ended: with --quiet, too, where it did not reach its end.
+void report_end(const CommonOptions& common, const std::string& line, ExitStatus status);
+
 }  // namespace crampfit::cli

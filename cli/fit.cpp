@@ -83,11 +83,16 @@ ExitStatus fit_and_save(const StudyArguments& arguments, const CommonOptions& co
     save(fit, arguments.output);
     double of_runs = 0;
     for (const auto& run : fit.runs) of_runs += run.seconds;
-    for (const std::string& sentence : sentences(fit.message)) report(common, sentence);
+    const ExitStatus status = exit_status(fit.status);
+    bool is_first = true;  // how it has ended; the others say what to make of it
+    for (const std::string& sentence : sentences(fit.message)) {
+        report_end(common, sentence, is_first ? status : ExitStatus::done);
+        is_first = false;
+    }
     report(common, fmt::format("{} runs in {}, each by itself {} in all, saved as {}", fit.runs.size(),
                                duration_text(fit.seconds), duration_text(of_runs), arguments.output.string()));
     print(table_text(fit));
-    return exit_status(fit.status);
+    return status;
 }
 
 }  // namespace

@@ -60,10 +60,12 @@ ExitStatus study_and_save(const StudyArguments& arguments, const CommonOptions& 
     check_outputs(arguments, files_of(study));
     const Sensitivity sensitivity = run(study, arguments, common, ranks);
     save(sensitivity, arguments.output);
-    report(common, fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,
-                               duration_text(sensitivity.seconds), arguments.output.string()));
+    const ExitStatus status = exit_status(sensitivity.status);
+    const std::string end = fmt::format("{}: {}; {}, saved as {}", name(sensitivity.status), sensitivity.message,
+                                        duration_text(sensitivity.seconds), arguments.output.string());
+    report_end(common, end, status);
     print(table_text(sensitivity));
-    return exit_status(sensitivity.status);
+    return status;
 }
 
 }  // namespace

@@ -52,11 +52,13 @@ ExitStatus simulate_and_save(const SimulateArguments& arguments, const CommonOpt
     spdlog::info("the scene is read");
     const Record record = run(scene, common);
     save(record, arguments.output);
-    report(common, fmt::format("{}: {}; {} points, {} steps in {}, saved as {}", name(record.status), record.message,
-                               record.points, record.steps, duration_text(record.seconds), arguments.output.string()));
+    const ExitStatus status = exit_status(record.status);
+    const std::string end = fmt::format("{}: {}; {} points, {} steps in {}, saved as {}", name(record.status), record.message,
+                                        record.points, record.steps, duration_text(record.seconds), arguments.output.string());
+    report_end(common, end, status);
     if (const double share = kinetic_share(record); share > quasistatic_share)
         report(common, fmt::format("not quasi-static: the kinetic energy was up to {:.2g} times the strain energy", share));
-    return exit_status(record.status);
+    return status;
 }
 
 }  // namespace

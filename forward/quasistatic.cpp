@@ -106,7 +106,6 @@ Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nul
 bool Quasistatic::fail() {
     failure_ = "no equilibrium was found";
     if (!plan_.linear && failed_time_ > 0) failure_ += fmt::format(" at {:.4g} s", time_of(failed_time_));
-    failure_ += advice_on_holds(scene_);
     return false;
 }
 

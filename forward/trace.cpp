@@ -75,7 +75,8 @@ class Tracer {
         follow();
         if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
             record_.status = RunStatus::unstable;
-            record_.message = walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "");
+            record_.message =
+                walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "") + advice_on_holds(scene_);
         }
         record_paths();
         if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;

@@ -81,7 +81,7 @@ TEST(SystemCommand, FitThatRunsOutOfRunsIsSavedWithStatusOne) {
     command.folder.write("study.toml", study(2));
     const Outcome outcome = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5"), "--quiet"});
     EXPECT_EQ(outcome.status, 1) << outcome.error;
-    EXPECT_EQ(outcome.error, "");
+    EXPECT_EQ(outcome.error, "crampfit: All runs that optimizer.max_runs allows were used up before the end.\n");
     EXPECT_EQ(read_fit(command.path("fit.h5")).status, FitStatus::run_limit);
 }
 
