@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <sstream>
 
 namespace crampfit {
@@ -71,10 +72,8 @@ DensityTable read_density_table(const std::filesystem::path& file) {
         if (!(table.density.back() >= 0))
             throw InputError(name, fmt::format("density, line {}", number), density, "must not be negative");
     }
-    for (std::size_t i = 2; i < table.density.size(); ++i)
-        if ((table.density[i] - table.density[i - 1]) * (table.density[1] - table.density[0]) < 0)
-            throw InputError(name, fmt::format("density, row {}", i + 1), fmt::format("{:g} kg/m^3", table.density[i]),
-                             "must rise all the way or fall all the way");
+    if (!std::ranges::is_sorted(table.density) && !std::ranges::is_sorted(table.density, std::ranges::greater{}))
+        throw InputError(name, "density", "rises and falls", "must rise all the way or fall all the way");
     if (table.gray.size() < 2)
         throw InputError(name, "", fmt::format("{} rows", table.gray.size()),
                          "needs a head gray,density [kg/m^3] and two rows at least");

@@ -87,6 +87,7 @@ TEST(UnitDensityTable, ReadsAndRefuses) {
     for (const char* bad :
          {"", "gray,density [kg/m^3]\n1,1\n", "gray,density\n1,1\n2,2\n", "gray,density [mm]\n1,1\n2,2\n",
           "gray,density [kg/m^3]\n2,1\n1,2\n", "gray,density [kg/m^3]\n1,a\n2,2\n", "gray,density [kg/m^3]\n1,1\n2,-2\n",
-          "gray,density [kg/m^3]\n1,1\n300,2\n", "gray,density [kg/m^3]\n1\n2\n", "x,density [kg/m^3]\n1,1\n2,2\n"})
+          "gray,density [kg/m^3]\n1,1\n300,2\n", "gray,density [kg/m^3]\n1,1\n2,3\n3,2\n", "gray,density [kg/m^3]\n1\n2\n",
+          "x,density [kg/m^3]\n1,1\n2,2\n"})
         EXPECT_THROW(read_density_table(folder.write("bad.csv", bad)), InputError) << bad;
 }
