@@ -59,10 +59,13 @@ BorderEdges::BorderEdges(const cv::Mat& gray, const cv::Mat& valid, const std::v
             const int begin = border.first + columns * k / count, end = border.first + columns * (k + 1) / count;
             const int middle = (begin + end) / 2;
             if (!border.covers(begin) || !border.covers(middle) || !border.covers(end - 1)) continue;
-            const double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle);
+            double before = width_beside(borders, i, -1, middle), after = width_beside(borders, i, 1, middle);
+            if (std::isinf(before) && std::isinf(after)) {  // of rings that reach out of the picture what is in it
+                before = border.at(middle);
+                after = gray.rows - 1 - before;
+            }
             const double beside = std::min(before, after);
-            if (!std::isfinite(beside) || beside < 4 * least_reach)
-                continue;  // rows that tell of a ring's end would be a quarter of it
+            if (beside < 4 * least_reach) continue;  // rows that tell of a ring's end would be a quarter of it
             const double slope = end - 1 > begin ? (border.at(end - 1) - border.at(begin)) / (end - 1 - begin) : 0;
             const double cosine = 1 / std::sqrt(1 + slope * slope);
             Stretch stretch{0.5 * (begin + end - 1), std::max(least_reach, share * beside * cosine), {}, {}, {}, {}};

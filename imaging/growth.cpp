@@ -90,7 +90,7 @@ GrowthGuess guess_growth(const cv::Mat& gray, const cv::Mat& valid, const Orient
     if (std::abs(turned) > plain_spread)
         return {turned > 0 ? with : against,
                 fmt::format("the rings' curvature ({:.2f} rad across the picture)", std::abs(turned))};
-    return {with, "assumption, for neither LW's sharper side nor curvature shows it: give --growth"};
+    return {with, "assumption, for neither LW's sharper side nor curvature shows it: give --growth", false};
 }
 
 }  // namespace crampfit

@@ -10,6 +10,7 @@ namespace crampfit {
 struct GrowthGuess {
     GrowthAxis growth;
     std::string reason;
+    bool shown = true;  // by the picture; else its sense is assumed
 };
 
 /// Rings lie across the axis that is nearer to the mean direction. Along it LW ends sharply and begins gradually, so the

@@ -102,6 +102,8 @@ struct Round {
     cv::Mat features;  // in the frame
     double ring_width = 0;
     std::string obstacle;  // to tracing rings; empty: none
+
+    cv::Mat late() const { return degree > 0.5; }  // 255 where LW is
 };
 
 double shorter_side(cv::Size picture) { return std::min(picture.width, picture.height); }
@@ -125,9 +127,9 @@ OrientationScale scale_for(double ring_width, const GrowthFrame& frame) {
 }
 
 /// Why no rings can be traced; empty where they can.
-std::string obstacle(const OrientationField& field) {
+std::string obstacle(const OrientationField& field, bool pith) {
     if (cv::mean(field.coherency)[0] < least_coherency) return "no rings: gray varies in all directions alike";
-    if (holds_pith(field)) return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
+    if (pith) return "rings not traced: the pith lies in the picture; cut a piece out on one side of it";
     return "";
 }
 
@@ -165,14 +167,14 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
 constexpr double same_light = 0.03;
 constexpr int most_looks = 3;
 
-/// `blank` is what is no specimen whatever else is found.
+/// `blank` is what is no specimen whatever else is found; `pith`: it lies in the picture.
 Round look(const cv::Mat& gray, const cv::Mat& bgr, const cv::Mat& blank, const cv::Mat& valid, const GrowthFrame& frame,
-           const OrientationField& orientation, double ring_width, const std::vector<BorderPolyline>& given) {
+           const OrientationField& orientation, bool pith, double ring_width, const std::vector<BorderPolyline>& given) {
     Round round;
     round.orientation = orientation;
     const RingCoordinate rings(round.orientation, frame);
     const StraightWood wood(gray, valid, rings);
-    round.obstacle = obstacle(round.orientation);
+    round.obstacle = obstacle(round.orientation, pith);
     if (!given.empty()) round.borders = lines_of(given, frame);
     else if (round.obstacle.empty()) round.borders = find_ring_borders(wood, valid, blank, rings, ring_width);
     round.ring_width = typical_ring_width(round.borders);
@@ -206,7 +208,9 @@ GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const Orientatio
         notes.push_back(fmt::format("growth {}, by {}", name(guess.growth), guess.reason));
         return guess.growth;
     }
-    if (*options.growth != guess.growth)
+    const bool across_others =
+        GrowthFrame(*options.growth, gray.size()).across() != GrowthFrame(guess.growth, gray.size()).across();
+    if (*options.growth != guess.growth && (guess.shown || across_others))
         notes.push_back(fmt::format("growth {} as told, though the picture looks like {}, by {}", name(*options.growth),
                                     name(guess.growth), guess.reason));
     return *options.growth;
@@ -230,7 +234,9 @@ struct View {
 struct FirstLook {
     GrowthAxis growth = GrowthAxis::right;
     double ring_width = 0;  // [pixels]; 0: not found
+    bool pith = false;      // seen
     cv::Mat valid;          // 1 where wood counts, in the frame
+    cv::Mat late;           // 255 where LW is, in the frame
 };
 
 FirstLook look_first(const View& view, const SegmentOptions& options, std::vector<std::string>& notes) {
@@ -238,8 +244,9 @@ FirstLook look_first(const View& view, const SegmentOptions& options, std::vecto
     const GrowthAxis growth = growth_of(view.gray, view.blank, orientation, options, notes);
     const GrowthFrame frame(growth, view.gray.size());
     const cv::Mat bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr), blank = frame.turn(view.blank);
-    const Round round = look(frame.turn(view.gray), bgr, blank, shown(blank), frame, orientation, 0, options.borders);
-    return {growth, round.ring_width, countable(round.features)};
+    const bool pith = holds_pith(orientation);
+    const Round round = look(frame.turn(view.gray), bgr, blank, shown(blank), frame, orientation, pith, 0, options.borders);
+    return {growth, round.ring_width, pith, countable(round.features), round.late()};
 }
 
 /// Of a large picture some four million pixels tell as much as all, where rings are not too fine for that.
@@ -252,7 +259,8 @@ FirstLook look_first_at_some(const View& view, const SegmentOptions& options, st
         if (look.ring_width > least_width) {
             notes.insert(notes.end(), small_notes.begin(), small_notes.end());
             look.ring_width /= factor;
-            cv::resize(look.valid, look.valid, GrowthFrame(look.growth, view.gray.size()).size(), 0, 0, cv::INTER_NEAREST);
+            for (cv::Mat* map : {&look.valid, &look.late})
+                cv::resize(*map, *map, GrowthFrame(look.growth, view.gray.size()).size(), 0, 0, cv::INTER_NEAREST);
             return look;
         }
     }
@@ -430,12 +438,13 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     const GrowthFrame frame(first.growth, view.gray.size());
     const cv::Mat turned = frame.turn(view.gray), bgr = view.bgr.empty() ? cv::Mat() : frame.turn(view.bgr);
     const OrientationScale scale = scale_for(first.ring_width, frame);
-    cv::Mat valid = first.valid, gray = flatten(turned, valid);
+    cv::Mat valid = first.valid, gray = flatten(turned, valid, first.late);
     Round second;
     for (int looks = 1;; ++looks) {
-        second = look(gray, bgr, frame.turn(view.blank), valid, frame, orientation_in(gray, valid, frame, scale),
-                      first.ring_width, options.borders);
-        const cv::Mat clearer = countable(second.features), flatter = flatten(turned, clearer);
+        const OrientationField orientation = orientation_in(gray, valid, frame, scale);
+        const bool pith = first.pith && holds_pith(orientation);  // narrow windows see others in noise
+        second = look(gray, bgr, frame.turn(view.blank), valid, frame, orientation, pith, first.ring_width, options.borders);
+        const cv::Mat clearer = countable(second.features), flatter = flatten(turned, clearer, second.late());
         if (looks == most_looks || cv::norm(flatter, gray, cv::NORM_INF) < same_light * cv::norm(gray, cv::NORM_INF)) break;
         valid = clearer;  // LW that uneven light had hidden shows
         gray = flatter;
@@ -466,9 +475,11 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
     specimen.rings = ring_figures(second.borders, classes, static_cast<int>(specimen.classes.size()) - 1, second.features);
     if (!second.obstacle.empty() && options.borders.empty()) result.notes.push_back(second.obstacle);
-    result.notes.push_back(fmt::format("{} ring borders{}, {} rings between them, typically {:.1f} pixels wide",
-                                       specimen.borders.size(), options.borders.empty() ? "" : " as given", specimen.rings.size(),
-                                       typical_width(specimen.rings, second.ring_width)));
+    std::string found = fmt::format("{} ring borders{}, {} rings between them", specimen.borders.size(),
+                                    options.borders.empty() ? "" : " as given", specimen.rings.size());
+    if (const double typical = typical_width(specimen.rings, second.ring_width); typical > 0)
+        found += fmt::format(", typically {:.1f} pixels wide", typical);
+    result.notes.push_back(std::move(found));
     warn_of_narrow(specimen.rings, result.notes);
     return result;
 }

@@ -158,6 +158,53 @@ TEST(VerificationDrawnRings, WithoutAPlateau) {
     }
 }
 
+// A few rings as broad as a third of the picture or more, whose LW would do for light from one side: it is LW for all that. Bars
+// of the borders, of the LW fraction and of the classes; no border is found beyond those drawn.
+TEST(VerificationDrawnRings, FewBroadRings) {
+    const cv::Size size(600, 400);
+    double miss = 0, late = 0, share = 1;
+    for (const double period : {200.0, 260.0, 300.0, 340.0})
+        for (const double start : {0.1, 0.35, 0.6, 0.85}) {
+            const Field radius = [&](double x, double y) { return std::hypot(x + 1500, y - 150) - 1500 + start * period; };
+            const auto place = [&](double x, double y) { return radius(x, y) / period - std::floor(radius(x, y) / period); };
+            const auto gray = [&](double x, double y) { return place(x, y) < 0.7 ? 190.0 : 80.0; };
+            const Specimen specimen = segment_pixels(drawn(size, gray, 0.7, 0.04 * 255), {.growth = GrowthAxis::right}).specimen;
+            double right = 0;
+            for (int y = 0; y < size.height; ++y)
+                for (int x = 0; x < size.width; ++x)
+                    right += specimen.label[static_cast<std::size_t>(y * size.width + x)] == (place(x, y) >= 0.7);
+            const std::vector<double> misses = border_misses(specimen, radius, period);
+            const double last = radius(size.width - 10, 200) / period, first = radius(10, 200) / period;
+            EXPECT_GE(static_cast<double>(specimen.borders.size()), std::floor(last) - std::floor(first))
+                << period << " " << start;
+            for (const RingFigures& ring : specimen.rings) late = std::max(late, std::abs(ring.latewood_fraction - 0.3));
+            miss = std::max(miss, at_share(misses, 0.99));
+            if (specimen.borders.size() > 1) share = std::min(share, right / static_cast<double>(size.area()));
+        }
+    std::printf("borders 99 %% within %.2f px; LW fraction within %.2f %%; classes %.2f %% right\n", miss, 100 * late,
+                100 * share);
+    EXPECT_LT(miss, 1);
+    EXPECT_LT(late, 0.02);
+    EXPECT_GT(share, 0.97);
+}
+
+// Narrow windows see directions turn about a point here and there, where rings wave under noise: no pith, rings are traced.
+TEST(VerificationDrawnRings, WavesAndNoiseAreNoPith) {
+    constexpr double group = 3 * 60 + 3 * 16;  // three broad rings, three narrow ones
+    const cv::Point2d waves[] = {{55, 0.8}, {58, 1.6}, {67, 1.6}, {55, 2.4}, {61, 0}, {64, 0.8}};  // length [px], phase
+    for (const auto& [length, phase] : waves) {
+        const auto gray = [length = length, phase = phase](double x, double y) {
+            const double r = std::hypot(x + 3000, y - 200) - 2940 + 2 * std::sin(2 * pi * y / length + phase);
+            const double place = r - group * std::floor(r / group),
+                         ring = (place < 180 ? place : place - 180) / (place < 180 ? 60 : 16);
+            return ring - std::floor(ring) < 0.7 ? 190.0 : 80.0;
+        };
+        const Segmentation result = segment_pixels(drawn({600, 400}, gray, 0.7, 0.06 * 255), {.growth = GrowthAxis::right});
+        EXPECT_GE(result.specimen.borders.size(), 15u) << length << " " << phase;
+        for (const std::string& note : result.notes) EXPECT_EQ(note.find("pith"), std::string::npos) << note;
+    }
+}
+
 // The steps of two plain classes are alike both ways and straight rings have no pith: waves must not be taken for its arcs.
 TEST(UnitDrawnRings, WavesDoNotTellTheGrowth) {
     for (const double phase : {0.0, 1.5, 3.0, 4.5}) {
