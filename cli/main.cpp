@@ -102,7 +102,8 @@ ExitStatus run_command(int argc, const char* const* argv) {
         correlate_verb(command, common),   track_verb(command, common),    camera_verb(command, common),
         csv_verb(command, common),         report_verb(command, common),   bench_verb(command, common)};
     for (const Verb& verb : verbs)
-        verb.arguments->footer("Every verb also takes --set, --threads, --quiet, --log, --version: see crampfit --help");
+        verb.arguments->footer("Every verb also takes --threads, --quiet, --log, --version, those that read a scene or a study "
+                               "--set: see crampfit --help");
     try {
         command.parse(argc, argv);
     } catch (const CLI::ParseError& end) {

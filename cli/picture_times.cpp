@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace crampfit::cli {
@@ -82,6 +83,18 @@ PictureInstants read_picture_times(const PictureTimes& times, std::size_t images
                            number_of(times.rate, limits::positive(dimension::number), "--rate")};
     const ClockSetting clock = set_clock(taken, load, told, times.times);
     for (double& time : instants.time) time = clock.offset + clock.rate * time;
+    const auto apart =
+        std::ranges::count_if(instants.time, [&](double time) { return std::isnan(load_at(load.time, load.time, time)); });
+    if (apart == std::ssize(instants.time))
+        throw InputError(
+            times.times.string(), "time",
+            fmt::format("{:.6g} to {:.6g} s on the load's clock", instants.time.front(), instants.time.back()),
+            fmt::format("no image lies on the load's record, {:.6g} to {:.6g} s: set its clock with --offset or --trigger",
+                        load.time.front(), load.time.back()));
+    if (apart > 0)
+        report(common,
+               fmt::format("the load's record, {:.6g} to {:.6g} s, does not reach {} of {} images: no load is known at them",
+                           load.time.front(), load.time.back(), apart, images));
     const auto at_images = [&](const std::vector<double>& column, std::vector<double>& to) {
         if (column.empty()) return;
         to.clear();

@@ -52,18 +52,22 @@ std::string indices_section(const Sensitivity& sensitivity) {
     for (const SensitivityIndex& index : sensitivity.indices) {
         const auto [low, high] = ranges[{index.output, index.kind}];
         const auto at = [low = low, high = high](double value) {
-            return high > low && std::isfinite(value) ? 5 + 130 * (value - low) / (high - low) : 5;
+            return high > low ? 5 + 130 * (value - low) / (high - low) : 5;
         };
         markup += fmt::format(
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to "
             "{:.4g}</td><td>{}</td>",
             escaped(index.output), escaped(index.parameter), escaped(index.method), escaped(index.kind), index.value,
             index.lower_95, index.upper_95, escaped(unit_of(sensitivity, index)));
-        markup += fmt::format(
-            "<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" stroke=\"#777\" />"
-            "<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" /><circle cx=\"{:.1f}\" cy=\"7\" r=\"4\" "
-            "fill=\"{}\" /></svg></td></tr>\n",
-            at(0), at(index.lower_95), at(index.upper_95), colour::blue, at(index.value), colour::blue);
+        markup += fmt::format("<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" "
+                              "stroke=\"#777\" />",
+                              at(0));
+        if (std::isfinite(index.lower_95) && std::isfinite(index.upper_95))
+            markup += fmt::format("<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" />", at(index.lower_95),
+                                  at(index.upper_95), colour::blue);
+        if (std::isfinite(index.value))
+            markup += fmt::format("<circle cx=\"{:.1f}\" cy=\"7\" r=\"4\" fill=\"{}\" />", at(index.value), colour::blue);
+        markup += "</svg></td></tr>\n";
     }
     return section("Indices", markup + "</tbody></table></div>\n");
 }

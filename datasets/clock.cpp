@@ -104,7 +104,11 @@ class SharedChannel {
 }  // namespace
 
 double load_at(const std::vector<double>& times, const std::vector<double>& values, double time) {
-    if (!(time >= times.front() && time <= times.back())) return CrackTip::unknown;
+    // Times to the last digit lie on the record's ends whatever an offset and a rate have rounded.
+    const double rounding =
+        1e-15 * std::max(std::abs(times.front()), std::abs(times.back())) + 1e-9 * (times.back() - times.front());
+    if (!(time >= times.front() - rounding && time <= times.back() + rounding)) return CrackTip::unknown;
+    time = std::clamp(time, times.front(), times.back());
     const auto after = std::ranges::lower_bound(times, time);
     const auto i = static_cast<std::size_t>(after - times.begin());
     if (*after == time) return values[i];

@@ -21,7 +21,7 @@ struct ClockChoice {
 /// too little.
 ClockSetting set_clock(const Curves& images, const Curves& load, const ClockChoice& told, const std::filesystem::path& file);
 
-/// A column of the load at a time, linearly between its rows; not a number outside them. Times must rise.
+/// A column of the load at a time, linearly between its rows; not a number outside them, but for rounding. Times must rise.
 double load_at(const std::vector<double>& times, const std::vector<double>& values, double time);
 
 }  // namespace crampfit

@@ -25,6 +25,18 @@ namespace {
 
 fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
+/// A symbolic link stays one: what it points to is written, whether or not it is there already.
+fs::path behind_links(const fs::path& file) {
+    constexpr int most = 40;
+    std::error_code error;
+    fs::path target = file;
+    for (int links = 0; fs::is_symlink(target, error); ++links) {
+        if (links == most) refuse(file, "its symbolic link leads to itself");
+        target = folder_of(target) / fs::read_symlink(target, error);
+    }
+    return target;
+}
+
 /// A file that did not exist before, removed again unless it has been given its final name.
 class TemporaryFile {
   public:
@@ -80,7 +92,8 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-void require_writable(const fs::path& file) {
+void require_writable(const fs::path& named) {
+    const fs::path file = behind_links(named);
     std::error_code error;
     if (!file.has_filename()) refuse(file, "the name of a file is needed");
     const fs::path folder = folder_of(file);
@@ -93,9 +106,8 @@ void require_writable(const fs::path& file) {
 }
 
 void write_whole_file(const fs::path& file, std::string_view bytes) {
-    // A symbolic link stays one: what it points to is replaced.
     require_writable(file);
-    const fs::path target = fs::is_symlink(file) ? fs::weakly_canonical(file) : file;
+    const fs::path target = behind_links(file);
     TemporaryFile temporary(target);
     temporary.write(bytes);
     temporary.give_final_name();

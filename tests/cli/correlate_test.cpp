@@ -108,6 +108,7 @@ TEST(SystemTrack, SeriesAndExperiment) {
                                command.path("p.png")});
     const Outcome outcome = command.run(words);
     ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_TRUE(contains(outcome.error, "does not reach 1 of 4 images")) << outcome.error;
     EXPECT_GT(command.folder.read("p.png").size(), 1000u);
     const std::string csv = command.run({"csv", command.path("track.h5"), "series"}).out;
     EXPECT_EQ(csv.substr(0, csv.find('\n')), "image,time_s,tip_x_px,tip_y_px,crack_length_m,sigma_m,status");
@@ -193,4 +194,5 @@ TEST(SystemTrack, BadTimesAndLoad) {
     refused({"--times", times, "--load", file("fall.csv", "time [s],force [N]\n2,1\n0,1\n")}, "must rise");
     refused({"--times", times, "--load", file("bare.csv", "time [s]\n0\n2\n")}, "displacement or force");
     refused({"--times", times, "--load", file("late.csv", "force [N]\n0\n2\n")}, "needs its time");
+    refused({"--times", times, "--load", rising, "--offset", "5 s"}, "no image lies on the load's record, 0 to 2 s");
 }

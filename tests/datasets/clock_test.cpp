@@ -71,6 +71,20 @@ TEST(UnitClock, IsSetAsTold) {
     EXPECT_NEAR(*off.misalignment, 1, 1e-6);
 }
 
+// The first and the last picture of a record are on it whatever an offset and a rate have rounded; a little beyond they are not.
+TEST(UnitClock, RoundingLosesNoPicture) {
+    std::vector<double> times, values;
+    for (int i = 0; i <= 10; ++i) {
+        times.push_back(1.1 + 0.3 * i);
+        values.push_back(i);
+    }
+    EXPECT_NEAR(load_at(times, values, times.front() * (1 - 1e-15)), 0, 1e-6);
+    EXPECT_NEAR(load_at(times, values, times.back() * (1 + 1e-15)), 10, 1e-6);
+    EXPECT_TRUE(std::isnan(load_at(times, values, times.front() - 1e-6)));
+    EXPECT_TRUE(std::isnan(load_at(times, values, times.back() + 1e-6)));
+    EXPECT_TRUE(std::isnan(load_at(times, values, NAN)));
+}
+
 TEST(UnitClock, AChannelThatSaysNothingIsRefused) {
     Curves images = camera_record(12, 1, 0), load = load_record();
     for (double& force : load.force) force = 5;

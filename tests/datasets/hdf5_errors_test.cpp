@@ -90,6 +90,13 @@ TEST(UnitHdf5, SymbolicLinkStaysAndItsTargetIsReplaced) {
     write(full_record(), folder / "link.h5");
     EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.h5"));
     EXPECT_EQ(read_record(folder / "target.h5").points, 5000);
+    std::filesystem::create_directory(folder / "inner");
+    std::filesystem::create_symlink("inner/new.h5", folder / "dangling.h5");
+    write(full_record(), folder / "dangling.h5");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "dangling.h5"));
+    EXPECT_EQ(read_record(folder / "inner/new.h5").points, 5000);
+    std::filesystem::create_symlink("ring.h5", folder / "ring.h5");
+    EXPECT_NE(message_of([&] { write(full_record(), folder / "ring.h5"); }).find("leads to itself"), std::string::npos);
 }
 
 TEST(UnitHdf5, MissingFileIsNamed) {
