@@ -104,9 +104,14 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     weigh(models, spreads, std::max(1.0, unexplained), best.residuals.size());
     if (models.size() > 1) {
-        best.message =
-            fmt::format("{} \"{}\" explains the data best, with {:.2g} of the evidence; next \"{}\" with {:.2g}. {}",
-                        study.compared_key, models[0].name, models[0].weight, models[1].name, models[1].weight, best.message);
+        constexpr double plain = 2;  // of AIC: less, and both have support (Burnham and Anderson 2002, section 2.6)
+        const ComparedModel &first = models[0], &second = models[1];
+        const char* verdict =
+            second.aic - first.aic > plain
+                ? "{0} \"{1}\" explains the data best, with {2:.2g} of the evidence; next \"{3}\" with {4:.2g}. {5}"
+                : "The data do not tell {0} \"{1}\" from \"{3}\": {2:.2g} and {4:.2g} of the evidence. {5}";
+        best.message = fmt::format(fmt::runtime(verdict), study.compared_key, first.name, first.weight, second.name,
+                                   second.weight, best.message);
     }
     best.models = std::move(models);
     best.seconds = seconds;

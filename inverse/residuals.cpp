@@ -169,6 +169,20 @@ double shift_error(const std::function<double(double)>& mean_at, double at, doub
     return span > 0 ? (high - low) / span * sigma : 0.0;
 }
 
+// The same of the rows' average over half a width to either side of a place that is `sigma` off.
+double place_error(const Curve& rows, double at, double half, double sigma) {
+    const auto mean_at = [&](double x) { return rows.mean(x - half, x + half); };
+    return shift_error(mean_at, at, sigma, rows.x().front() + half, rows.x().back() - half);
+}
+
+double largest(const Curve& rows) {
+    double most = 0;
+    for (const double value : rows.y()) {
+        most = std::max(most, std::abs(value));
+    }
+    return most;
+}
+
 // A jump between two rows, `jump` of what the curve goes from one to the next, was anywhere between them. What that does to the
 // mean: the jump times the standard deviation of its place, uniform between the rows, over the window.
 double sampling_error(const Curve& rows, double from, double to, const std::function<double(double, double)>& jump) {
@@ -207,8 +221,7 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
 
 }  // namespace
 
-Comparison::Comparison(const Experiment& experiment, double model_resolution)
-    : model_resolution_(model_resolution), longest_(experiment.scene.stop.crack_length) {
+Comparison::Comparison(const Experiment& experiment, double model_resolution) : longest_(experiment.scene.stop.crack_length) {
     if (experiment.fields) {
         fields_.emplace(experiment);
         remarks_.push_back(fields_->remark());
@@ -228,6 +241,34 @@ Comparison::Comparison(const Experiment& experiment, double model_resolution)
     if (stations_.empty()) {
         throw bad_data(experiment, "crack_length", "constant",
                        "must grow by more than its noise, as there is no force to compare");
+    }
+    know_to(model_resolution);
+}
+
+double Comparison::sigma(std::size_t station, double model_resolution) const {
+    if (station >= errors_.size()) {
+        return stations_[station].sigma;  // a field's
+    }
+    const auto& [of_data, half, together] = errors_[station];
+    const FitResidual& one = stations_[station];
+    if (one.kind == "arrival") {
+        return std::hypot(of_data[0], model_resolution * one.measured) * std::sqrt(together);
+    }
+    const bool is_force = one.kind == "force";
+    const double of_place = place_error(is_force ? *forces_ : *lengths_, one.at, half, model_resolution * one.at);
+    const double of_value = model_resolution * (is_force ? peak_force_ : longest_length_);
+    return Eigen::Vector<double, 5>(of_data[0], of_data[1], of_data[2], of_place, of_value).norm();
+}
+
+Eigen::VectorXd Comparison::sigmas(double model_resolution) const {
+    return Eigen::VectorXd::NullaryExpr(static_cast<Eigen::Index>(stations_.size()), [&](Eigen::Index station) {
+        return sigma(static_cast<std::size_t>(station), model_resolution);
+    });
+}
+
+void Comparison::know_to(double model_resolution) {
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+        stations_[i].sigma = sigma(i, model_resolution);
     }
 }
 
@@ -276,14 +317,11 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
 }
 
 void Comparison::add_force_stations(const Experiment& experiment) {
-    const Curve rows(abscissa_, experiment.data.force);
+    const Curve& rows = forces_.emplace(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
+    peak_force_ = largest(rows);
     const double from = rows.x().front(), to = rows.x().back();
     const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
-    double peak = 0;
-    for (const double force : rows.y()) {
-        peak = std::max(peak, std::abs(force));
-    }
     const double usual = std::max(noise, usual_step(rows));
     const auto fall = [usual](double before, double after) {
         const double by = std::abs(before) - std::abs(after);
@@ -300,22 +338,17 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         FitResidual station{.experiment = experiment.name, .kind = "force", .at = at};
         station.measured = rows.mean(tile.first, tile.second);
         const double averaging = rows.error_of_mean(tile.first, tile.second);
-        const auto place_error = [&](double sigma) {
-            return shift_error([&](double x) { return rows.mean(x - half, x + half); }, at, sigma, from + half, to - half);
-        };
-        const double of_noise = noise * averaging;
-        const double of_data_place = place_error(abscissa_noise_) * averaging;
-        const double of_model_place = place_error(model_resolution_ * at);
+        const double of_place = place_error(rows, at, half, abscissa_noise_) * averaging;
         const double of_sampling = half > 0 ? sampling_error(rows, tile.first, tile.second, fall) : 0.0;
-        const double of_model_force = model_resolution_ * peak;
-        station.sigma = Eigen::Vector<double, 5>(of_noise, of_sampling, of_data_place, of_model_place, of_model_force).norm();
         stations_.push_back(station);
+        errors_.push_back({{noise * averaging, of_sampling, of_place}, half});
     }
 }
 
 void Comparison::add_crack_stations(const Experiment& experiment) {
-    const Curve rows(abscissa_, experiment.data.crack_length);
+    const Curve& rows = lengths_.emplace(abscissa_, experiment.data.crack_length);
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
+    longest_length_ = largest(rows);
     add_arrival_stations(experiment, rows, noise);
     add_length_stations(experiment, rows, noise);
 }
@@ -364,8 +397,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         // Just before a jump and behind it one side says little.
         const double of_length = std::max(*arrival - early, late - *arrival) / std::sqrt(line_averages);
         const double of_data_place = abscissa_noise_ / std::sqrt(averaged);
-        station.sigma = std::hypot(std::max(std::hypot(of_length, of_data_place), of_jump), model_resolution_ * *arrival);
         stations_.push_back(station);
+        errors_.push_back({{std::max(std::hypot(of_length, of_data_place), of_jump), 0, 0}});
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());
@@ -374,7 +407,7 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         const auto together = std::count_if(alone.begin(), alone.end(), [&](const FitResidual& other) {
             return std::abs(other.measured - stations_[i].measured) <= reach[i - first];
         });
-        stations_[i].sigma *= std::sqrt(static_cast<double>(together));
+        errors_[i].together = static_cast<double>(together);
         counts_.push_back(1.0 / static_cast<double>(together));
     }
 }
@@ -416,19 +449,14 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
             }
         }
     }
-    const double longest = *std::max_element(rows.y().begin(), rows.y().end());
     const auto jump = [&](double before, double after) { return after - before > clear * noise ? after - before : 0.0; };
     for (const auto& [from, to] : length_tiles_) {
         const double at = std::midpoint(from, to), half = 0.5 * (to - from);
         const double averaging = rows.error_of_mean(from, to);
-        const auto place_error = [&](double sigma) {
-            return shift_error([&](double u) { return rows.mean(u - half, u + half); }, at, sigma, first, last);
-        };
         FitResidual station{.experiment = experiment.name, .kind = "crack_length", .at = at, .measured = rows.mean(from, to)};
         const double of_sampling = half > 0 ? sampling_error(rows, from, to, jump) : 0.0;
-        station.sigma = Eigen::Vector<double, 5>(noise * averaging, of_sampling, place_error(abscissa_noise_) * averaging,
-                                                 place_error(model_resolution_ * at), model_resolution_ * longest)
-                            .norm();
+        const double of_place = place_error(rows, at, half, abscissa_noise_) * averaging;
+        errors_.push_back({{noise * averaging, of_sampling, of_place}, half});
         stations_.push_back(station);
         counts_.push_back(1.0);
     }

@@ -3,6 +3,7 @@
 #include "datasets/experiment.hpp"
 #include "datasets/fit.hpp"
 #include "datasets/record.hpp"
+#include "inverse/curve.hpp"
 #include "inverse/field_comparison.hpp"
 
 #include <Eigen/Core>
@@ -13,8 +14,6 @@
 #include <vector>
 
 namespace crampfit {
-
-class Curve;
 
 /// One experiment's data as stations at which a Record is compared with it.
 ///
@@ -57,6 +56,12 @@ class Comparison {
     /// For how many measurements each station counts [stations]: one, or its part of those that share their rows.
     const std::vector<double>& counts() const { return counts_; }
 
+    /// One sigma of each station where the model knows what it says to another resolution [stations], at little cost.
+    Eigen::VectorXd sigmas(double model_resolution) const;
+
+    /// From here on stations have these sigmas.
+    void know_to(double model_resolution);
+
     /// What the record has at each station [stations], SI. All finite if the record's numbers are.
     /// `slack_force` is what the load cell says once the specimen has split [N].
     Eigen::VectorXd modelled(const Record& record, double slack_force = 0.0) const;
@@ -71,9 +76,16 @@ class Comparison {
     void add_crack_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
+    double sigma(std::size_t station, double model_resolution) const;
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
 
-    double model_resolution_;
+    /// What the data know of a station [its unit].
+    struct Errors {
+        Eigen::Vector3d of_data;  // by noise, by sampling, by the place; of an arrival all in the first
+        double half = 0;          // width of its average [m] or [s]
+        double together = 1;      // stations that count as one
+    };
+
     std::optional<double> longest_;  // crack, that ends runs [m]
     bool by_time_ = false;           // stations stand on time [s] instead of displacement [m]
     std::vector<double> abscissa_;   // measured displacement [m] or time [s], a row
@@ -83,8 +95,11 @@ class Comparison {
     double pace_ = 0;                // mean displacement (time) a length of growth in the test [m/m] or [s/m]
     std::vector<std::pair<double, double>> force_tiles_;   // from, to [m] or [s]: one a station of force
     std::vector<std::pair<double, double>> length_tiles_;  // the same of crack length
+    std::optional<Curve> forces_, lengths_;                // the rows [N], [m]
+    double peak_force_ = 0, longest_length_ = 0;           // of them
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
+    std::vector<Errors> errors_;         // of the curves' stations
     std::vector<double> counts_;         // [stations]
     std::vector<std::string> noise_;     // of each column, in words
     std::vector<std::string> remarks_;

@@ -45,7 +45,9 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
         tests_[i].data = covered.curves;
         left_out_.push_back(covered.remark);
     }
-    comparisons_ = comparisons_at(model_resolution);
+    for (const Experiment& experiment : tests_) {
+        comparisons_.emplace_back(experiment, model_resolution);
+    }
     const std::size_t stations = station_count();
     if (stations < study.parameters.size()) {
         throw InputError(study.file.empty() ? "study" : study.file.string(), "parameters",
@@ -54,25 +56,19 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
     }
 }
 
-std::vector<Comparison> StudyModel::comparisons_at(double resolution) const {
-    std::vector<Comparison> comparisons;
-    for (const Experiment& experiment : tests_) {
-        comparisons.emplace_back(experiment, resolution);
-    }
-    return comparisons;
-}
-
 void StudyModel::set_resolution(double resolution) {
     resolution_ = resolution;
-    comparisons_ = comparisons_at(resolution);
+    for (Comparison& comparison : comparisons_) {
+        comparison.know_to(resolution);
+    }
 }
 
 double StudyModel::change_of_sigma(double resolution) const {
-    const std::vector<Comparison> others = comparisons_at(resolution);
     double most = 0;
-    for (std::size_t i = 0; i < others.size(); ++i) {
-        for (std::size_t k = 0; k < others[i].stations().size(); ++k) {
-            most = std::max(most, std::abs(others[i].stations()[k].sigma / comparisons_[i].stations()[k].sigma - 1));
+    for (const Comparison& comparison : comparisons_) {
+        const Eigen::VectorXd others = comparison.sigmas(resolution);
+        for (Eigen::Index k = 0; k < others.size(); ++k) {
+            most = std::max(most, std::abs(others[k] / comparison.stations()[static_cast<std::size_t>(k)].sigma - 1));
         }
     }
     return most;
@@ -90,11 +86,13 @@ double StudyModel::likely_resolution(const Evaluation& evaluation, double most) 
         double sum = 0;
         Eigen::Index row = 0;
         for (std::size_t i = 0; i < comparisons_.size(); ++i) {
-            const Comparison comparison(tests_[i], resolution);
+            const Comparison& comparison = comparisons_[i];
+            const Eigen::VectorXd sigmas = comparison.sigmas(resolution);
             for (std::size_t k = 0; k < comparison.stations().size(); ++k) {
-                const FitResidual& station = comparison.stations()[k];
-                const double r = softened((evaluation.modelled[row++] - station.measured) / station.sigma, study_.optimizer.loss);
-                sum += study_.experiments[i].weight * (r * r + share * comparison.counts()[k] * 2 * std::log(station.sigma));
+                const double sigma = sigmas[static_cast<Eigen::Index>(k)];
+                const double off = evaluation.modelled[row++] - comparison.stations()[k].measured;
+                const double r = softened(off / sigma, study_.optimizer.loss);
+                sum += study_.experiments[i].weight * (r * r + share * comparison.counts()[k] * 2 * std::log(sigma));
             }
         }
         return sum;

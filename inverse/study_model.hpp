@@ -60,7 +60,6 @@ class StudyModel {
     std::string remarks() const;                                  // on the data, for a person
 
   private:
-    std::vector<Comparison> comparisons_at(double resolution) const;
     std::size_t station_count() const;
 
     const Study& study_;

@@ -85,6 +85,15 @@ TEST(UnitCompare, FiguresFollowTheirFormulas) {
     }
 }
 
+TEST(UnitCompare, ModelsAlikeAreNotRanked) {
+    const Study study = compared_study(1, 0, 3);
+    FitOptions options;
+    options.forward = [](const Scene& scene, const std::atomic<bool>*) { return turned_wedge(scene, 0); };
+    const Fit fit = fit_models(study, options);
+    EXPECT_NEAR(fit.models[0].weight, 0.25, 1e-3);
+    EXPECT_EQ(fit.message.rfind("The data do not tell cracks.0.direction", 0), 0u) << fit.message;
+}
+
 // One row in ten is off by 30 standard deviations, always upward.
 TEST(VerificationLoss, OutliersHardlyMoveARobustFit) {
     FakeWedge wedge;
