@@ -27,6 +27,11 @@ class LocalModel {
     /// left to tell.
     Eigen::VectorXd jacobian_error() const { return slope_error_ * scatter_.norm() / std::sqrt(std::max(1, freedom_)); }
 
+    /// The same of each of its numbers [residuals x parameters].
+    Eigen::MatrixXd jacobian_errors() const {
+        return scatter_.rowwise().norm() / std::sqrt(std::max(1, freedom_)) * slope_error_.transpose();
+    }
+
     /// What the fit leaves of each run's residuals [residuals x runs].
     const Eigen::MatrixXd& scatter() const { return scatter_; }
     int freedom() const { return freedom_; }  // runs less the fitted terms

@@ -154,6 +154,27 @@ Eigen::MatrixXd model_covariance(const Directions& directions) {
     return covariance;
 }
 
+// J with the columns, too, that a few stations beside a jump hide by their scatter and the others tell: by more than two standard
+// errors in the mean (root mean square) of those that they move.
+Eigen::MatrixXd slope_beside_jumps(const Directions& directions) {
+    constexpr double least = 1e-3, plain = 2, most = 10;  // sigmas that a window moves a station by; standard errors
+    const Eigen::MatrixXd jacobian = directions.model.jacobian(), error = directions.model.jacobian_errors();
+    Eigen::MatrixXd slope = directions.slope;
+    for (Eigen::Index j = 0; j < slope.cols(); ++j) {
+        double squares = 0, moved = 0;
+        for (Eigen::Index row = 0; row < slope.rows(); ++row) {
+            if (std::abs(jacobian(row, j)) > least) {
+                squares += std::min(most * most, std::pow(jacobian(row, j) / std::max(error(row, j), least / most), 2));
+                ++moved;
+            }
+        }
+        if (slope.col(j).isZero(0.0) && squares > plain * plain * moved) {
+            slope.col(j) = jacobian.col(j);
+        }
+    }
+    return slope;
+}
+
 }  // namespace
 
 double student_975(int degrees_of_freedom) {
@@ -219,7 +240,7 @@ Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& cur
     result.widening = widening;
     result.temperature = widening * weights.squaredNorm() / weights.sum();
     result.model_variance = own.diagonal();
-    result.slope = directions->slope * window.axes.inverse();
+    result.slope = slope_beside_jumps(*directions) * window.axes.inverse();
     result.untold = undetermined.untold();
     for (const Untold& direction : result.untold) {
         result.message += direction.sentence;

@@ -1,4 +1,5 @@
 #include "inverse/uncertainty.hpp"
+#include "inverse/differences.hpp"
 #include "inverse/fit.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
@@ -57,6 +58,30 @@ TEST(SystemUncertainty, NamesAParameterWithoutEffect) {
     EXPECT_NEAR(fit.parameters[0].value, true_earlywood, 3);
     EXPECT_LT(fit.parameters[0].upper_95, 120);
     EXPECT_NEAR(fit.parameters[1].upper_95, 400, 1e-9);
+}
+
+// One station stands beside a jump, on whose one side or other a run comes out as chance has it, by hundreds of sigmas. By itself
+// that hides what a parameter does to all others; slopes keep it. A parameter that does nothing has none.
+TEST(UnitUncertainty, AJumpAtOneStationHidesNoSlopeAtTheOthers) {
+    constexpr int count = 50;
+    const auto slope = [](int i) { return 12.0 * i / count; };
+    const auto evaluate = [&](const Eigen::VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.residuals = Eigen::VectorXd::Zero(count + 1);
+        for (int i = 0; i < count; ++i) {
+            evaluation.residuals[i] = slope(i) * (x[0] - 0.5) + 1e-10 * scramble(x[1], i);
+        }
+        evaluation.residuals[count] = x.isConstant(0.5) ? 0.0 : 300 * scramble(x[0], x[1]);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(2, evaluate, 1000, 1);
+    objective.at(Eigen::VectorXd(Eigen::Vector2d(0.5, 0.5)));
+    const Uncertainty found = estimate_uncertainty(objective, {{count, 1}}, {"a", "b"}, difference_step, Window(2));
+    for (int i = 0; i < count; ++i) {
+        EXPECT_NEAR(found.slope(i, 0), slope(i), 1e-6) << i;
+    }
+    EXPECT_TRUE(found.slope.col(1).isZero(0.0));
 }
 
 // Force rises with the toughness of earlywood and with the displacement. What rounding leaves of no effect, 1e-12 of the force,
