@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 #include "forward/plan.hpp"
 #include "forward/simulate.hpp"
+#include "forward/thin_voids.hpp"
 
 #include <fmt/format.h>
 
@@ -71,13 +72,21 @@ std::vector<Quantity> quantities_of(const Record& record) {
     return found;
 }
 
-// Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, or no equilibrium is found.
+bool bridges_voids(const Scene& scene, double cells) {
+    const Scene other = with_cells(scene, cells);
+    const MaterialMap materials(other);
+    return thin_voids(other, Discretisation(other, materials)).has_value();
+}
+
+// Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, a void is bridged, or no equilibrium
+// is found.
 std::optional<Trial> try_grid(const Scene& scene, double cells) {
     Scene coarse = with_cells(scene, cells);
     coarse.output.frames = 0;
     coarse.output.samples = 50;
     coarse.solver.extrapolate = false;  // or the change from grid to grid would not tell the error
     try {
+        if (bridges_voids(scene, cells)) return {};
         const Record record = simulate(coarse);
         Trial trial{cells, quantities_of(record), record.seconds};
         const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(),
@@ -190,6 +199,12 @@ GridChoice choose_grid(const Scene& scene, double error) {
         chosen = std::max(fewest_cells(estimates, error, least), trials.front().cells);
         if (chosen <= 2.0 * cells) break;  // else so far beyond the grids tried that one more is worth it
     }
+    if (estimates.empty() && bridges_voids(scene, most_cells_tried / 4.0))
+        refuse(
+            scene, error,
+            fmt::format("the specimen has voids thinner than two cells of grids with {:g} cells across, which join the wood on "
+                        "both sides: draw cracks along them, or give model.cell",
+                        most_cells_tried / 4.0));
     if (estimates.empty())
         refuse(scene, error,
                fmt::format("not three of the grids with {:g} to {:g} cells across gave a result to compare: give model.cell",

@@ -181,6 +181,14 @@ bool wide_cells_see_cracks(const Scene& scene, const MaterialMap& materials, con
     });
 }
 
+// Or they would join what a void parts.
+bool wide_cells_see_voids(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
+    for (int c = 0; c < body.layout.cells(); ++c)
+        if (!body.cell_is_full(c))
+            return !thin_voids(scene, Discretisation(scene, materials, Layout::of(scene, 2.0 * body.layout.cell)));
+    return true;
+}
+
 void check_cracks(const Scene& scene, const Discretisation& body) {
     const Vec2 size = body.layout.size(), hair = 1e-9 * size;
     for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
@@ -427,13 +435,15 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const bool may_extrapolate = plan.quasistatic && scene.solver.extrapolate && fine_enough && !may_meet && !plan.remembers;
     const bool resolved = may_extrapolate && resolves_woods(body);
     const bool held = resolved && meets_nodes(scene, Layout::of(scene, 2.0 * body.layout.cell));
-    plan.extrapolates = held && wide_cells_see_cracks(scene, materials, body);
+    const bool sees_cracks = held && wide_cells_see_cracks(scene, materials, body);
+    plan.extrapolates = sees_cracks && wide_cells_see_voids(scene, materials, body);
     if (plan.quasistatic)
         choose("grids", plan.extrapolates ? "two, one twice as coarse" : "one",
                plan.extrapolates ? "a third of their difference takes off most of the grid's error (Richardson 1911)"
                : plan.remembers  ? "wood that remembers: errors of time and of the grid do not go together"
                : may_meet
                    ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
+               : sees_cracks     ? "a second, twice as coarse, would join the wood on both sides of a void"
                : held            ? "a second, twice as coarse, would have no wood beside a crack"
                : resolved        ? "a second, twice as coarse, would have no node where an edge or a bonded body holds"
                : may_extrapolate ? "layers of the stiffest wood are less than two cells of a second, twice as coarse, wide: its "

@@ -218,6 +218,23 @@ TEST(UnitPlan, ACrackBesideAGripIsForOneGrid) {
     }
 }
 
+// A slot of two cells that wide ones lie half in would be none on these: their force, half as high again, is nothing to go by.
+TEST(UnitPlan, AVoidThatWideCellsBridgeIsForOneGrid) {
+    double force[2];
+    for (const bool aligned : {false, true}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.25e-3));
+        const double low = aligned ? 5e-3 : 5.25e-3, high = low + 0.5e-3;
+        scene.specimen.cutouts = {Polygon{{Vec2(-1e-3, low), Vec2(5e-3, low), Vec2(5e-3, high), Vec2(-1e-3, high)}}};
+        scene.edges = {moving("top", Side::top, {0.0, 1e-3}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        scene.measure = {"top", "top"};
+        scene.stop.displacement = 1e-4;
+        const MaterialMap materials(scene);
+        EXPECT_EQ(make_plan(scene, materials, Discretisation(scene, materials)).extrapolates, aligned);
+        force[aligned] = simulate(scene).series.back().force;
+    }
+    EXPECT_NEAR(force[0] / force[1], 1.0, 0.03);
+}
+
 // Wide cells of which no node lies on a short stretch would not hold it.
 TEST(UnitPlan, AStretchBetweenNodesOfWideCellsIsForOneGrid) {
     for (const auto& [from, both] : {std::pair{5.2e-3, false}, std::pair{4.9e-3, true}}) {

@@ -79,6 +79,10 @@ TEST(UnitGridChoice, RefusesWhatItCannotHonour) {
     fast.solver.kind = SolverKind::explicit_dynamics;
     refused(fast, 0.02, "at equilibrium only");
     refused(at_equilibrium(ring_specimen(3e-3, 0.5e-3)), 1e-7, "would not meet it");
+    Scene slotted = at_equilibrium(ring_specimen(3e-3, 0.5e-3));  // by a tenth of a millimetre, from its left side
+    slotted.cracks.clear();
+    slotted.specimen.cutouts = {Polygon{{Vec2(-1e-3, 4.9e-3), Vec2(3e-3, 4.9e-3), Vec2(3e-3, 5e-3), Vec2(-1e-3, 5e-3)}}};
+    refused(slotted, 0.02, "voids thinner than two cells");
 }
 
 // Over less than a cell energy is released in steps with the grid, and grids may agree by chance.
