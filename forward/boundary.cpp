@@ -53,21 +53,20 @@ bool holds_node(const Shape& shape, const SpecimenPlan& specimen, const Vec2& x,
 }  // namespace
 
 bool meets_nodes(const Scene& scene, const Layout& layout) {
-    const auto any_node = [&](const auto& is_held) {
-        for (int n = 0; n < layout.nodes(); ++n)
-            if (is_held(layout.node_position(n))) return true;
-        return false;
+    const auto nodes = [&](const auto& is_held) {
+        int count = 0;
+        for (int n = 0; n < layout.nodes(); ++n) count += is_held(layout.node_position(n));
+        return count;
     };
-    return std::ranges::all_of(scene.edges,
-                               [&](const Edge& edge) {
-                                   return edge.traction || !edge.range || any_node([&](const Vec2& x) {
-                                              return on_side(layout, edge.side, x) && in_range(layout, edge, x);
-                                          });
-                               }) &&
-           std::ranges::all_of(scene.bodies, [&](const Body& grip) {
-               return grip.contact.kind != Contact::Kind::bonded ||
-                      any_node([&](const Vec2& x) { return holds_node(grip.shape, scene.specimen, x, layout.cell.minCoeff()); });
-           });
+    const auto meets = [&](const Edge& edge) {
+        return nodes([&](const Vec2& x) { return on_side(layout, edge.side, x) && in_range(layout, edge, x); }) >= 2;
+    };
+    const auto holds = [&](const Body& grip) {
+        const double cell = layout.cell.minCoeff();
+        return nodes([&](const Vec2& x) { return holds_node(grip.shape, scene.specimen, x, cell); }) > 0;
+    };
+    return std::ranges::all_of(scene.edges, [&](const Edge& e) { return e.traction || !e.range || meets(e); }) &&
+           std::ranges::all_of(scene.bodies, [&](const Body& b) { return b.contact.kind != Contact::Kind::bonded || holds(b); });
 }
 
 Gauges::Gauges(const Scene& scene) {

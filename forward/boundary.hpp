@@ -89,7 +89,8 @@ class Boundary {
     std::vector<Held> others_;  // of nodes: what else would hold them
 };
 
-/// Whether each stretch of a side that moves or stands, and each bonded body, has a node of such a grid to hold.
+/// Whether each bonded body has a node of such a grid to hold, and each stretch of a side that moves or stands two: with one its
+/// force hangs on where in a cell it ends.
 bool meets_nodes(const Scene& scene, const Layout& layout);
 
 /// What is measured: which drivers, and along which directions.

@@ -78,15 +78,13 @@ bool bridges_voids(const Scene& scene, double cells) {
     return thin_voids(other, Discretisation(other, materials)).has_value();
 }
 
-// Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, a void is bridged, or no equilibrium
-// is found.
+// Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, or no equilibrium is found.
 std::optional<Trial> try_grid(const Scene& scene, double cells) {
     Scene coarse = with_cells(scene, cells);
     coarse.output.frames = 0;
     coarse.output.samples = 50;
     coarse.solver.extrapolate = false;  // or the change from grid to grid would not tell the error
     try {
-        if (bridges_voids(scene, cells)) return {};
         const Record record = simulate(coarse);
         Trial trial{cells, quantities_of(record), record.seconds};
         const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(),
@@ -106,10 +104,18 @@ struct Estimate {
     double cells;
     std::array<std::pair<double, double>, 2> seen;  // coarser grids' cells, and how far off these were
 
+    // Whatever the power says, fewer cells than those of a grid that was seen are no better, and between two of these the error
+    // goes from one to the other.
     double at(double other_cells) const {
         double error = at_finest * std::pow(cells / other_cells, power);
-        for (const auto& [seen_cells, seen_error] : seen)  // still fewer cells are no better, whatever the power says
-            if (other_cells <= seen_cells) error = std::max(error, seen_error);
+        std::pair<double, double> finer{cells, at_finest};
+        for (auto one = seen.rbegin(); one != seen.rend(); finer = *one++) {
+            if (other_cells <= one->first) error = std::max(error, one->second);
+            else if (other_cells < finer.first && finer.second > 0.0) {
+                const double way = std::log(other_cells / one->first) / std::log(finer.first / one->first);
+                error = std::max(error, one->second * std::pow(finer.second / one->second, way));
+            }
+        }
         return error;
     }
 };
@@ -183,9 +189,15 @@ GridChoice choose_grid(const Scene& scene, double error) {
     std::vector<Trial> trials;
     std::vector<Estimate> estimates;
     double chosen = most_cells_chosen + multiple;
-    const double coarsest = std::min(least_cells(scene, most_advances_a_cell), most_cells_tried / 4.0);
+    const double coarsest = std::min(least_cells(scene, most_advances_a_cell), most_cells_tried / 2.0);
     const double least = least_cells(scene, 1.0);
-    for (double cells = coarsest; cells <= most_cells_tried; cells *= 2.0) {
+    double most = most_cells_tried;
+    for (double cells = coarsest; cells <= most; cells *= 2.0) {
+        if (bridges_voids(scene, cells)) {
+            most = 2.0 * most_cells_tried;  // finer ones than else have a say
+            trials.clear();
+            continue;
+        }
         const auto trial = try_grid(scene, cells);
         if (!trial) {
             trials.clear();
@@ -199,12 +211,12 @@ GridChoice choose_grid(const Scene& scene, double error) {
         chosen = std::max(fewest_cells(estimates, error, least), trials.front().cells);
         if (chosen <= 2.0 * cells) break;  // else so far beyond the grids tried that one more is worth it
     }
-    if (estimates.empty() && bridges_voids(scene, most_cells_tried / 4.0))
+    if (estimates.empty() && most > most_cells_tried)
         refuse(
             scene, error,
-            fmt::format("the specimen has voids thinner than two cells of grids with {:g} cells across, which join the wood on "
-                        "both sides: draw cracks along them, or give model.cell",
-                        most_cells_tried / 4.0));
+            fmt::format("grids with fewer than {:g} cells across join the wood on both sides of voids that are thinner than two "
+                        "of them, and three that do not are needed: draw cracks along the voids, or give model.cell",
+                        trials.empty() ? most : trials.front().cells));
     if (estimates.empty())
         refuse(scene, error,
                fmt::format("not three of the grids with {:g} to {:g} cells across gave a result to compare: give model.cell",

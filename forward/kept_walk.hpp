@@ -30,6 +30,9 @@ class KeptWalk {
     /// method leaves: so does what a run gives.
     bool linear() const { return plan_.linear; }
 
+    /// Whether the wood's rotation is finite; else strain is small.
+    bool rotates() const { return plan_.rotates; }
+
     /// Whether a second grid, with cells twice as wide, takes its share off (Quasistatic).
     bool extrapolates() const { return plan_.extrapolates; }
 

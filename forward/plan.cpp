@@ -445,7 +445,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                    ? "several cracks: where they come near each other a second, twice as coarse, would not see the wood between"
                : sees_cracks     ? "a second, twice as coarse, would join the wood on both sides of a void"
                : held            ? "a second, twice as coarse, would have no wood beside a crack"
-               : resolved        ? "a second, twice as coarse, would have no node where an edge or a bonded body holds"
+               : resolved        ? "a second, twice as coarse, would have hardly a node where an edge or a bonded body holds"
                : may_extrapolate ? "layers of the stiffest wood are less than two cells of a second, twice as coarse, wide: its "
                                    "error would not tell"
                : scene.solver.extrapolate

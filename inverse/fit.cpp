@@ -308,6 +308,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
         fit.message +=
             contradicted_priors(box, best.x) + opposite_forces(fit.residuals) + lack_of_fit(fit.checks) + model.remarks();
         if (own) {
+            fit.message += runs.walks().other_strain(runs.values_at(best.x));
             fit.message +=
                 fmt::format("Beyond the noise of the data the model is taken to know what it says to within {:.2g} %. ",
                             100 * model.resolution());

@@ -162,6 +162,25 @@ class KeptWalks::Store {
         return {found.begin(), found.end()};
     }
 
+    std::string other_strain(const std::vector<double>& values) {
+        for (const Scene* scene : scenes_) {
+            Scene alone = at_point(*scene, values);
+            const std::shared_ptr<KeptWalk> walk = walk_of(of_walk(alone));
+            for (const Setting& setting : toughness_) {
+                if (has(alone, setting.key)) {
+                    set_number(alone, setting.key, setting.factor * values[setting.parameter]);
+                }
+            }
+            if (walk->reusable() && KeptWalk(alone).rotates() != walk->rotates()) {
+                return fmt::format("Runs took {}, as with the initial values; by itself a run of {} with the best ones takes {}, "
+                                   "and its force is another: start from these, or set solver.strain. ",
+                                   walk->rotates() ? "finite rotation" : "small strain", scene->file.filename().string(),
+                                   walk->rotates() ? "small strain" : "finite rotation");
+            }
+        }
+        return "";
+    }
+
   private:
     struct Work {
         std::string walk;  // of the first scene
@@ -386,6 +405,7 @@ bool KeptWalks::turn_with_toughness() const { return store_->turn_with_toughness
 std::vector<Eigen::Index> KeptWalks::turning() const { return store_->turning(); }
 std::vector<bool> KeptWalks::exact_near() const { return store_->exact_near(); }
 bool KeptWalks::has_slopes() const { return store_->has_slopes(); }
+std::string KeptWalks::other_strain(const std::vector<double>& values) const { return store_->other_strain(values); }
 bool KeptWalks::has_exact_slopes() const { return store_->has_exact_slopes(); }
 
 }  // namespace crampfit

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace crampfit {
@@ -65,6 +66,9 @@ class KeptWalks {
 
     /// Whether all runs of the study are walks with other toughnesses or moduli, from equilibrium to equilibrium.
     bool at_equilibrium() const { return only_toughness() || has_slopes(); }
+
+    /// Says where a run by itself with these values would take another kind of strain (plan) than the walks do; else empty.
+    std::string other_strain(const std::vector<double>& values) const;
 
   private:
     class Store;

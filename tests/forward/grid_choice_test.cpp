@@ -82,7 +82,7 @@ TEST(UnitGridChoice, RefusesWhatItCannotHonour) {
     Scene slotted = at_equilibrium(ring_specimen(3e-3, 0.5e-3));  // by a tenth of a millimetre, from its left side
     slotted.cracks.clear();
     slotted.specimen.cutouts = {Polygon{{Vec2(-1e-3, 4.9e-3), Vec2(3e-3, 4.9e-3), Vec2(3e-3, 5e-3), Vec2(-1e-3, 5e-3)}}};
-    refused(slotted, 0.02, "voids thinner than two cells");
+    refused(slotted, 0.02, "sides of voids");
 }
 
 // Over less than a cell energy is released in steps with the grid, and grids may agree by chance.

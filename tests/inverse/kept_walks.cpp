@@ -59,6 +59,20 @@ double apart(const Record& a, const Record& b) {
     return most;
 }
 
+// How far a specimen goes until it cracks hangs on its toughness, and with that the kind of strain that a run takes.
+TEST(UnitKeptWalks, SayWhereARunWouldTakeAnotherStrain) {
+    Scene scene = across_inclined_rings(GrowthDirection::straight);
+    scene.stop.displacement = 10e-3;
+    for (const StrainMeasure strain : {StrainMeasure::automatic, StrainMeasure::small}) {
+        scene.solver.strain = strain;
+        const Study study = toughness_study(scene);
+        const KeptWalks walks(study);
+        EXPECT_EQ(walks.other_strain({110, 90}), "");
+        const bool told = walks.other_strain({3e4, 3e4}).find("Runs took small strain") == 0;
+        EXPECT_EQ(told, strain == StrainMeasure::automatic);
+    }
+}
+
 // Which way a crack goes may hang on the toughness: then another toughness is not a run on the same walk.
 TEST(UnitKeptWalks, AnotherToughnessGoesItsOwnWay) {
     for (const GrowthDirection direction : {GrowthDirection::energy_release_rate, GrowthDirection::normal_to_opening}) {
