@@ -29,15 +29,23 @@ std::vector<Eigen::Index> columns_with_effect(const Eigen::VectorXd& length, con
     return columns;
 }
 
-Directions take_apart(const Run& best, const LocalModel& model, double radius) {
-    const Eigen::MatrixXd jacobian = model.jacobian();
+// Of each residual: as one whose noise of one is outdone by the model's scatter.
+Eigen::VectorXd weights_by_scatter(const LocalModel& model) {
+    const Eigen::VectorXd scatter = model.scatter().rowwise().norm() / std::sqrt(std::max(1, model.freedom()));
+    return scatter.cwiseMax(1.0).cwiseInverse();
+}
+
+Directions take_apart(const Run& best, const LocalModel& model, double radius, const Eigen::VectorXd& weight) {
+    const Eigen::MatrixXd jacobian = weight.asDiagonal() * model.jacobian();
     const Eigen::Index p = jacobian.cols();
-    const Eigen::VectorXd length = jacobian.colwise().norm(), error = model.jacobian_error();
+    const Eigen::VectorXd length = jacobian.colwise().norm();
+    const Eigen::VectorXd error = (weight.asDiagonal() * model.jacobian_errors()).colwise().norm();
     const std::vector<Eigen::Index> told = columns_with_effect(length, error);
     const auto count = static_cast<Eigen::Index>(told.size());
     Directions result{best,
                       model,
                       radius,
+                      weight,
                       Eigen::MatrixXd::Zero(jacobian.rows(), p),
                       Eigen::VectorXd::Ones(p),
                       Eigen::VectorXd::Zero(p),
@@ -66,6 +74,22 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
         }
     }
     return result;
+}
+
+Directions take_apart(const Run& best, const LocalModel& model, double radius) {
+    Directions found = take_apart(best, model, radius, Eigen::VectorXd::Ones(model.scatter().rows()));
+    if (!found.wider_would_tell()) {
+        return found;
+    }
+    Directions beside_jumps = take_apart(best, model, radius, weights_by_scatter(model));
+    const auto told = [](const Directions& directions) {
+        int count = 0;
+        for (Eigen::Index k = 0; k < directions.singular.size(); ++k) {
+            count += directions.resolved(k);
+        }
+        return count;
+    };
+    return told(beside_jumps) > told(found) ? beside_jumps : found;
 }
 
 }  // namespace

@@ -11,12 +11,14 @@ namespace crampfit {
 
 /// How the residuals change about the best run: the slope J of a polynomial through the runs near it, its columns
 /// scaled to length one, taken apart into singular values. A parameter whose column cannot be told from none has a column of
-/// zeros and a direction of its own.
+/// zeros and a direction of its own. Beside a jump few residuals scatter by much: where all together do not tell every direction,
+/// each counts for no more than its scatter leaves of it, if that tells more.
 struct Directions {
     Run best;
     LocalModel model;
     double radius = 0;         // of the differences that the model rests on, a part of the box
-    Eigen::MatrixXd slope;     // J [residuals x parameters]
+    Eigen::VectorXd weight;    // [residuals]: 1; less where a residual scatters and hides what the others tell
+    Eigen::MatrixXd slope;     // J, rows by their weight [residuals x parameters]
     Eigen::VectorXd scale;     // of x: 1 / length of J's columns [parameters]
     Eigen::VectorXd singular;  // falling [parameters]
     Eigen::VectorXd error;     // one sigma of each singular value, by the model's scatter [parameters]

@@ -23,11 +23,7 @@ class LocalModel {
     Eigen::VectorXd residuals(const Eigen::VectorXd& x) const;  // [residuals]
     Eigen::MatrixXd jacobian() const;                           // at the centre [residuals x parameters]
 
-    /// Standard error of each of the Jacobian's columns, as the length of a vector [parameters]; 0 where nothing is
-    /// left to tell.
-    Eigen::VectorXd jacobian_error() const { return slope_error_ * scatter_.norm() / std::sqrt(std::max(1, freedom_)); }
-
-    /// The same of each of its numbers [residuals x parameters].
+    /// Standard errors of the Jacobian [residuals x parameters]; 0 where nothing is left to tell.
     Eigen::MatrixXd jacobian_errors() const {
         return scatter_.rowwise().norm() / std::sqrt(std::max(1, freedom_)) * slope_error_.transpose();
     }

@@ -238,7 +238,7 @@ Comparison::Comparison(const Experiment& experiment, double model_resolution) : 
     counts_.resize(stations_.size(), 1.0);
     const std::string noise = noise_.empty() ? "as the fields have it" : fmt::format("{}", fmt::join(noise_, ", "));
     remarks_.push_back(fmt::format("{}: noise (one sigma): {}; weight {:g}.", experiment.name, noise, experiment.weight));
-    if (stations_.empty()) {
+    if (std::ranges::all_of(stations_, [](const FitResidual& station) { return station.kind == "crack_length"; })) {
         throw bad_data(experiment, "crack_length", "constant",
                        "must grow by more than its noise, as there is no force to compare");
     }
@@ -282,6 +282,11 @@ void Comparison::add_curves(const Experiment& experiment) {
         throw bad_data(experiment, "force", "absent", "a force or a crack_length column is needed to compare a model with");
     }
     abscissa_ = by_time_ ? data.time : data.displacement;
+    const auto& materials = experiment.scene.materials;
+    const bool remembers = std::ranges::any_of(materials, [](const auto& material) { return material.second.remembers(); });
+    if (!by_time_ && measured(data.time) && remembers) {
+        tell_of_hold(experiment);
+    }
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
     check_rises(experiment, abscissa_, by_time_ ? "time" : "displacement");
     if (abscissa_noise_ > 0) {
@@ -293,6 +298,33 @@ void Comparison::add_curves(const Experiment& experiment) {
     }
     if (measured(data.crack_length)) {
         add_crack_stations(experiment);
+    }
+}
+
+// Rows at one displacement count as one there, whatever the wood does meanwhile.
+void Comparison::tell_of_hold(const Experiment& experiment) {
+    constexpr double plain = 0.25;  // of the rows
+    std::vector<double> places = abscissa_;
+    std::erase_if(places, [](double place) { return std::isnan(place); });
+    std::ranges::sort(places);
+    if (places.empty()) {
+        return;
+    }
+    const double window = smoothing_window * (places.back() - places.front());
+    std::ptrdiff_t most = 0;
+    double where = 0;
+    for (auto first = places.begin(), last = first; first != places.end(); ++first) {
+        last = std::find_if(last, places.end(), [&](double place) { return place > *first + window; });
+        if (last - first > most) {
+            most = last - first;
+            where = *first;
+        }
+    }
+    if (static_cast<double>(most) > plain * static_cast<double>(places.size())) {
+        remarks_.push_back(
+            fmt::format("{}: {} of {} rows stand at {:.3g} mm and count as one there; of wood that remembers they tell "
+                        "more by time: leave displacement out.",
+                        experiment.name, most, places.size(), 1e3 * where));
     }
 }
 
@@ -372,7 +404,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
     }
     const double growth = longest - shortest;
     if (!(growth > 3 * noise)) {
-        remarks_.push_back(experiment.name + ": the crack did not grow by more than its noise; crack_length is not used.");
+        remarks_.push_back(experiment.name +
+                           ": the crack did not grow by more than its noise; its length is compared as it stands.");
         return;
     }
     pace_ = (to - from - arrival_window_) / growth;  // between the middles of the two windows
@@ -419,9 +452,6 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
         if (station.kind == "arrival") {
             arrivals.push_back(station.measured);
         }
-    }
-    if (arrivals.empty()) {
-        return;
     }
     std::sort(arrivals.begin(), arrivals.end());
     const std::vector<double>& x = rows.x();

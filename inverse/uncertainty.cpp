@@ -146,7 +146,8 @@ Eigen::MatrixXd model_covariance(const Directions& directions) {
         for (Eigen::Index k = 0; k < p; ++k) {
             if (directions.resolved(k)) {
                 moved += directions.scale.cwiseProduct(directions.v.col(k)) *
-                         (directions.u.col(k).transpose() * model.scatter()) / directions.singular[k];
+                         (directions.u.col(k).transpose() * directions.weight.asDiagonal() * model.scatter()) /
+                         directions.singular[k];
             }
         }
         covariance += moved * moved.transpose() / model.freedom();
@@ -159,7 +160,7 @@ Eigen::MatrixXd model_covariance(const Directions& directions) {
 Eigen::MatrixXd slope_beside_jumps(const Directions& directions) {
     constexpr double least = 1e-3, plain = 2, most = 10;  // sigmas that a window moves a station by; standard errors
     const Eigen::MatrixXd jacobian = directions.model.jacobian(), error = directions.model.jacobian_errors();
-    Eigen::MatrixXd slope = directions.slope;
+    Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());
     for (Eigen::Index j = 0; j < slope.cols(); ++j) {
         double squares = 0, moved = 0;
         for (Eigen::Index row = 0; row < slope.rows(); ++row) {
@@ -168,7 +169,7 @@ Eigen::MatrixXd slope_beside_jumps(const Directions& directions) {
                 ++moved;
             }
         }
-        if (slope.col(j).isZero(0.0) && squares > plain * plain * moved) {
+        if (!directions.slope.col(j).isZero(0.0) || squares > plain * plain * moved) {
             slope.col(j) = jacobian.col(j);
         }
     }

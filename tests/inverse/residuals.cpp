@@ -420,6 +420,49 @@ TEST(UnitResiduals, NoiseThatIsNotGivenIsEstimatedAndSaidSo) {
     EXPECT_NE(comparison.remarks()[1].find("noise of crack_length"), std::string::npos);
 }
 
+// That a crack stands says how tough the wood is at the least.
+TEST(UnitResiduals, ACrackThatStandsIsComparedByItsLength) {
+    Experiment experiment = straight_experiment();
+    experiment.data = measure(straight(1e5, 0, 1e-3), 2.0, 0.2e-3, 7);
+    const Comparison comparison(experiment);
+    EXPECT_TRUE(of_kind(comparison, "arrival").empty());
+    const auto lengths = of_kind(comparison, "crack_length");
+    EXPECT_EQ(lengths.size(), 50u);
+    const Eigen::VectorXd stands = comparison.modelled(straight(1e5, 0, 1e-3)),
+                          grows = comparison.modelled(straight(1e5, 8, 1e-3));
+    double misfit[] = {0, 0};
+    for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+        const FitResidual& station = comparison.stations()[i];
+        if (station.kind == "crack_length") {
+            misfit[0] += std::pow((stands[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma, 2);
+            misfit[1] += std::pow((grows[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma, 2);
+        }
+    }
+    EXPECT_LT(misfit[0], 50 + 4 * std::sqrt(2 * 50.0));
+    EXPECT_GT(misfit[1], 1e3);
+}
+
+// While displacement stands, wood that remembers goes on: rows by displacement would hide it, and this is said.
+TEST(UnitResiduals, RowsOfAHoldAreToldOf) {
+    Experiment experiment = straight_experiment();
+    experiment.data = measure(straight(1e5, 8, 1e-3), 2.0, 0.2e-3, 7);
+    const auto told = [&] {
+        return std::ranges::any_of(Comparison(experiment).remarks(), [](const std::string& remark) {
+            return remark.find("count as one there") != std::string::npos;
+        });
+    };
+    const double last = experiment.data.displacement.back();
+    for (int i = 0; i < 300; ++i) {
+        experiment.data.time.push_back(experiment.data.time.back() + 1);
+        experiment.data.displacement.push_back(last);
+        experiment.data.force.push_back(experiment.data.force.back());
+        experiment.data.crack_length.push_back(experiment.data.crack_length.back());
+    }
+    EXPECT_FALSE(told());
+    experiment.scene.materials["EW"].viscoelastic.emplace();
+    EXPECT_TRUE(told());
+}
+
 void expect_refused(const Experiment& experiment, const std::string& key) {
     try {
         const Comparison comparison(experiment);

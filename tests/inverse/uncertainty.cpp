@@ -61,7 +61,7 @@ TEST(SystemUncertainty, NamesAParameterWithoutEffect) {
 }
 
 // One station stands beside a jump, on whose one side or other a run comes out as chance has it, by hundreds of sigmas. By itself
-// that hides what a parameter does to all others; slopes keep it. A parameter that does nothing has none.
+// that hides what a parameter does to all others; slopes and intervals keep it. A parameter that does nothing has none.
 TEST(UnitUncertainty, AJumpAtOneStationHidesNoSlopeAtTheOthers) {
     constexpr int count = 50;
     const auto slope = [](int i) { return 12.0 * i / count; };
@@ -82,6 +82,9 @@ TEST(UnitUncertainty, AJumpAtOneStationHidesNoSlopeAtTheOthers) {
         EXPECT_NEAR(found.slope(i, 0), slope(i), 1e-6) << i;
     }
     EXPECT_TRUE(found.slope.col(1).isZero(0.0));
+    ASSERT_EQ(found.untold.size(), 1u);
+    EXPECT_EQ(found.untold[0].parameters, std::vector<Eigen::Index>{1});
+    EXPECT_NEAR(std::sqrt(found.covariance(0, 0) - found.model_variance[0]) * found.slope.col(0).head(count).norm(), 1, 0.05);
 }
 
 // Force rises with the toughness of earlywood and with the displacement. What rounding leaves of no effect, 1e-12 of the force,
