@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
-#include <numeric>
 
 namespace crampfit {
 namespace {
@@ -139,8 +139,11 @@ Evaluation StudyRuns::run(const Eigen::VectorXd& x, int share) {
 SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
                                 const std::function<void(const std::string&)>& stage) {
     // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
-    const std::vector<int> lengths = model_.curves().lengths;
-    const double enough = nearby_.ways_differ ? 0.0 : std::accumulate(lengths.begin(), lengths.end(), 0);
+    const MeasuredCurves curves = model_.curves();
+    double enough = 0;
+    for (std::size_t i = 0; i < curves.lengths.size() && !nearby_.ways_differ; ++i) {
+        enough += std::pow(curves.root(i), 2) * curves.lengths[i];
+    }
     const auto is_enough = [enough](const Evaluation& best) { return best.misfit < enough; };
     SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
     found.converged = heed_data(weigh_and_descend(found.converged, enough > 0), [this] { return descend_again(); });
