@@ -30,6 +30,11 @@ bool is_toughness(const Parameter& parameter) {
     return std::ranges::any_of(parameter.keys, [](const std::string& key) { return key.ends_with(".toughness"); });
 }
 
+bool is_modulus(const Parameter& parameter) {
+    return std::ranges::any_of(parameter.keys, [](const std::string& key) { return key.starts_with("materials."); }) &&
+           !is_toughness(parameter);
+}
+
 bool has_two_grids(const Experiment& experiment) { return KeptWalk(experiment.scene).extrapolates(); }
 
 // What a parameter's shifts are large or small beside, SI: its value, and where that may be near 0 half of its box.
@@ -101,7 +106,16 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
         slope.row(row) *= before[i].sigma / after[i].sigma;
         change[row] *= share.at(before[i].experiment);
     }
-    return least_squares(slope, change);
+    Eigen::VectorXd left = least_squares(slope, change);
+    const bool on_one_grid = std::ranges::any_of(share, [](const auto& of_one) { return of_one.second == 1.0; });
+    for (Eigen::Index j = 0; j < left.size() && on_one_grid; ++j) {
+        const Parameter& parameter = model.box().parameters()[static_cast<std::size_t>(j)];
+        if (is_modulus(parameter)) {
+            const double most = farthest_told * size_of(parameter, values[j]) / model.box().slope(j, best.x[j]);
+            left[j] = std::copysign(std::max(std::abs(left[j]), std::min(3 * std::abs(left[j]), most)), left[j]);
+        }
+    }
+    return left;
 }
 
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left) {

@@ -57,6 +57,9 @@ TEST(UnitGridShare, IsWhatAFitOnWideCellsIsOffBy) {
         std::printf("left %.6f %.6f of %.6f %.6f\n", left[0], left[1], off[0], off[1]);
         EXPECT_NEAR(left[0], share * off[0], 1e-8);
         EXPECT_NEAR(left[1], share * off[1], 1e-8);
+        study.parameters[0].keys = {"materials.EW.E"};  // of a modulus, on one grid, by the first power of the cell
+        const StudyModel of_modulus(study, with(FakeWedge{.sharpness = 1.0}).forward, 0.0, nullptr);
+        EXPECT_NEAR(left_by_grid(study, of_modulus, best, wide, about)[0], (extrapolates ? 0.75 : 3.0) * off[0], 1e-8);
     }
 }
 
