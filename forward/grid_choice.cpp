@@ -72,10 +72,15 @@ std::vector<Quantity> quantities_of(const Record& record) {
     return found;
 }
 
+// Not where the grid is too coarse for anything.
 bool bridges_voids(const Scene& scene, double cells) {
     const Scene other = with_cells(scene, cells);
-    const MaterialMap materials(other);
-    return thin_voids(other, Discretisation(other, materials)).has_value();
+    try {
+        const MaterialMap materials(other);
+        return thin_voids(other, Discretisation(other, materials)).has_value();
+    } catch (const InputError&) {
+        return false;
+    }
 }
 
 // Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, or no equilibrium is found.
