@@ -239,7 +239,7 @@ TEST(UnitDrawnRings, LatewoodDiffersFromRingToRing) {
                                  0.15, -0.05, 0.2,  -0.4, 0.05, -0.15, 0.4,  0.0};
     const auto gray = [&](double x, double) {
         const double ring = std::floor(x / 40);
-        return x / 40 - ring < 0.75 ? 200.0 : 100 - 100 * darker[static_cast<int>(ring) % 17];
+        return x / 40 - ring < 0.75 ? 200.0 : 100 - 100 * darker[static_cast<int>(ring + 17) % 17];
     };
     const Specimen specimen = segment_pixels(drawn({680, 200}, gray, 0.7, 3), {.growth = GrowthAxis::right}).specimen;
     EXPECT_EQ(specimen.rings.size(), 15u);
