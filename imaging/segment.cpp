@@ -212,7 +212,7 @@ GrowthAxis growth_of(const cv::Mat& gray, const cv::Mat& blank, const Orientatio
         GrowthFrame(*options.growth, gray.size()).across() != GrowthFrame(guess.growth, gray.size()).across();
     if (*options.growth != guess.growth && (guess.shown || across_others))
         notes.push_back(fmt::format("growth {} as told, though the picture looks like {}, by {}", name(*options.growth),
-                                    name(guess.growth), guess.reason));
+                                    name(guess.growth), guess.shown ? guess.reason : "the rings' direction"));
     return *options.growth;
 }
 

@@ -95,9 +95,12 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
     model.weigh(wide, values);
     const std::vector<FitResidual> after = model.residuals(here);
     std::map<std::string, double> share;
+    bool on_one_grid = false;
     for (const Experiment& experiment : study.experiments) {
+        const bool two_grids = has_two_grids(experiment);
         // Of the difference between what a scene gives and what it gives on wide cells: that between the two grids by themselves.
-        share[experiment.name] = has_two_grids(experiment) ? 0.75 : 1.0;
+        share[experiment.name] = two_grids ? 0.75 : 1.0;
+        on_one_grid = on_one_grid || !two_grids;
     }
     Eigen::VectorXd change = wide.residuals - here.residuals;
     Eigen::MatrixXd slope = about.slope;
@@ -107,7 +110,6 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
         change[row] *= share.at(before[i].experiment);
     }
     Eigen::VectorXd left = least_squares(slope, change);
-    const bool on_one_grid = std::ranges::any_of(share, [](const auto& of_one) { return of_one.second == 1.0; });
     for (Eigen::Index j = 0; j < left.size() && on_one_grid; ++j) {
         const Parameter& parameter = model.box().parameters()[static_cast<std::size_t>(j)];
         if (is_modulus(parameter)) {

@@ -164,6 +164,9 @@ class KeptWalks::Store {
 
     std::string other_strain(const std::vector<double>& values) {
         for (const Scene* scene : scenes_) {
+            if (scene->solver.strain != StrainMeasure::automatic) {
+                continue;
+            }
             Scene alone = at_point(*scene, values);
             const std::shared_ptr<KeptWalk> walk = walk_of(of_walk(alone));
             for (const Setting& setting : toughness_) {

@@ -218,7 +218,7 @@ TEST(UnitPlan, ACrackBesideAGripIsForOneGrid) {
     }
 }
 
-// A slot of two cells that wide ones lie half in would be none on these: their force, half as high again, is nothing to go by.
+// A slot of two cells that wide ones lie half in would be none on these, and their force nothing to go by.
 TEST(UnitPlan, AVoidThatWideCellsBridgeIsForOneGrid) {
     double force[2];
     for (const bool aligned : {false, true}) {
