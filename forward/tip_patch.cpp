@@ -15,11 +15,13 @@ namespace {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-// Half width of the wide patch: so many advances, and so many cells at least.
+// Half width of the patch: so many advances, and so many cells at least.
 constexpr double advances_in_reach = 8.0;
 constexpr double least_cells_in_reach = 10.0;
 // Patches go on to sides of the specimen within so many times that: nothing holds those.
 constexpr double side_in_reach = 1.5;
+// A beam is so many times as long as high.
+constexpr double least_length_of_beam = 2.0;
 
 // Of the largest stiffness, added everywhere: a field with hardly any wood is loose otherwise.
 constexpr double least_stiffness = 1e-9;
@@ -86,14 +88,26 @@ TipPatch::TipPatch(Discretisation& body, InternalForce& internal_force, const Cr
         passed.push_back(k);
         pairs_.push_back({pair.node, freed, pair.compliance / tie_share(left, right)});
     }
-    wide_ = {tip.position.array() - reach_, tip.position.array() + reach_};
-    Box narrow{tip.position.array() - 0.5 * reach_, tip.position.array() + 0.5 * reach_};
+    const auto goes_on_to = [&](double reach, int axis, bool high) {
+        const double side = high ? body.layout.size()[axis] - tip.position[axis] : tip.position[axis];
+        return side <= side_in_reach * reach;
+    };
+    const auto box_of = [&](double reach) {
+        Box box{tip.position.array() - reach, tip.position.array() + reach};
+        for (int axis = 0; axis < 2; ++axis) {
+            if (goes_on_to(std::max(reach, reach_), axis, false)) box.low[axis] = 0.0;
+            if (goes_on_to(std::max(reach, reach_), axis, true)) box.high[axis] = body.layout.size()[axis];
+        }
+        return box;
+    };
+    bool in_beam = false;
     for (int axis = 0; axis < 2; ++axis) {
-        const double beyond = side_in_reach * reach_, size = body.layout.size()[axis], at = tip.position[axis];
-        if (at <= beyond) narrow.low[axis] = wide_.low[axis] = 0.0;
-        if (size - at <= beyond) narrow.high[axis] = wide_.high[axis] = size;
+        const bool is_long = body.layout.size()[1 - axis] >= least_length_of_beam * body.layout.size()[axis];
+        in_beam |= is_long && goes_on_to(2.0 * reach_, axis, false) && goes_on_to(2.0 * reach_, axis, true);
     }
-    for (const Box& box : {narrow, wide_})
+    other_reach_ = in_beam ? 2.0 * reach_ : 0.5 * reach_;
+    box_ = box_of(reach_);
+    for (const Box& box : {box_, box_of(other_reach_)})
         woods_.push_back(cut_out(body, internal_force, ahead, cracks.fields(), boundary, box, passed));
     body.points.node = points_before;
 }
@@ -263,7 +277,7 @@ double TipPatch::given(const Wood& wood, double gone, const std::vector<double>&
 // a straight line would not know that the rate changes on the way.
 double TipPatch::softness(double gone, const std::vector<Vec2>& displacement) const {
     if (is_idle()) return 1.0;
-    const Wood& wood = woods_.back();
+    const Wood& wood = woods_.front();
     const Eigen::VectorXd jumps = wood.jumps_of(displacement);
     if (jumps.isZero()) return 1.0;
     const auto at = [&](double place, double factor) {
@@ -303,7 +317,7 @@ void TipPatch::take_in(const FineTip::Ahead& ahead, double gone, const std::vect
     known_ = {gone, {}};
     if (ahead.potential.empty()) return;
     const std::vector<double> factors = factors_of(gone, displacement, ties), ways = ways_from(gone);
-    const Wood& wood = woods_.back();
+    const Wood& wood = woods_.front();
     const Eigen::VectorXd jumps = wood.jumps_of(displacement);
     for (std::size_t k = 0, end = legs + 1; k <= legs; ++k, ++end) {
         const double finer = ahead.potential[k] - ahead.potential[end];
@@ -323,18 +337,22 @@ TipPatch::Rates TipPatch::rates(double gone, const std::vector<Vec2>& displaceme
     if (is_idle() || advance_ <= cell_) return {};
     const std::vector<double> factors = factors_of(gone, displacement, ties);
     const double next = to_next_pair(gone), on = next > least_way * cell_ ? std::min(next, little * cell_) : little * cell_;
-    double now = 0.0;
-    const auto now_over_mean_in = [&](const Wood& wood) {
+    struct Told {
+        double now, now_over_mean;
+    };
+    const auto told_by = [&](const Wood& wood) {
         const Eigen::VectorXd jumps = wood.jumps_of(displacement);
         const auto at = [&](double place) { return potential(wood, place, factors, jumps); };
-        now = (at(gone) - at(gone + on)) / on;
-        return now * advance_ / given(wood, gone, factors, jumps);
+        const double now = (at(gone) - at(gone + on)) / on;
+        return Told{now, now * advance_ / given(wood, gone, factors, jumps)};
     };
-    const double narrow = now_over_mean_in(woods_.front()), wide = now_over_mean_in(woods_.back());
-    const double more = woods_.back().is_whole ? 0.0 : std::max(0.0, 1.0 - reach_ / held_at_);
+    const Told own = told_by(woods_.front()), other = told_by(woods_.back());
+    const bool is_wider = other_reach_ > reach_;
+    const double narrow = (is_wider ? own : other).now_over_mean, wide = (is_wider ? other : own).now_over_mean;
+    const double more = woods_[is_wider].is_whole ? 0.0 : std::max(0.0, 1.0 - std::max(reach_, other_reach_) / held_at_);
     const double now_over_mean = wide + more * (wide - narrow);
     if (!(now_over_mean > 0.0)) return {};
-    return {now, now / now_over_mean};
+    return {own.now, own.now / now_over_mean};
 }
 
 }  // namespace crampfit

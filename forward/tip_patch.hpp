@@ -23,7 +23,8 @@ namespace crampfit {
 ///
 /// The held outline takes up what a longer crack would pass on to the rest of the specimen, so that the rate falls on the way, by
 /// a part of it that goes with the way over the patch's size: two patches, one half as wide as the other but where that ends with
-/// the specimen, tell what it would be with an outline as far away as the specimen is held (Richardson 1911).
+/// the specimen, tell what it would be with an outline as far away as the specimen is held (Richardson 1911). In a beam, which
+/// gives way otherwise than wood that goes on to all sides, the second one is twice as wide, and takes in its sides.
 class TipPatch {
   public:
     /// What holds the pair at a node (TipTies).
@@ -55,8 +56,7 @@ class TipPatch {
     /// the formula of `FieldPair::compliance` does not know of boundaries in the wood.
     double softness(double gone, const std::vector<Vec2>& displacement) const;
 
-    /// The wide patch.
-    const Box& box() const { return wide_; }
+    const Box& box() const { return box_; }
 
     /// Ways of a tip that has `gone` so far already, at whose ends it hangs what finer cells give up [m].
     std::vector<double> ways_from(double gone) const;
@@ -87,22 +87,22 @@ class TipPatch {
     std::vector<double> factors_of(double gone, const std::vector<Vec2>& displacement, std::span<const Tie> ties) const;
     double given(const Wood& wood, double gone, const std::vector<double>& softness, const Eigen::VectorXd& jumps) const;
     double to_next_pair(double gone) const;
-    bool is_idle() const { return woods_.empty() || pairs_.empty() || woods_.back().held.empty(); }
+    bool is_idle() const { return woods_.empty() || pairs_.empty() || woods_.front().held.empty(); }
 
-    double cell_ = 0;     // way of the tip that frees a pair [m]
-    double advance_ = 0;  // what was asked for, or as far as the tip stays in the wood [m]
-    double slack_ = 0;    // [m]
-    double way_ = 0;      // of the tip whose pairs it knows [m]
-    double reach_ = 0;    // [m]
-    double held_at_ = 0;  // [m]
-    Box wide_;
+    double cell_ = 0;                     // way of the tip that frees a pair [m]
+    double advance_ = 0;                  // what was asked for, or as far as the tip stays in the wood [m]
+    double slack_ = 0;                    // [m]
+    double way_ = 0;                      // of the tip whose pairs it knows [m]
+    double reach_ = 0, other_reach_ = 0;  // [m]
+    double held_at_ = 0;                  // [m]
+    Box box_;
     struct Known {
         double from = 0;                  // how far the tip had gone [m]
         std::vector<double> finer_share;  // from there on, at the first half of its ways
     };
     Known known_;
     std::vector<Pair> pairs_;  // on the way
-    std::vector<Wood> woods_;  // the narrow one, the wide one; none where no more than the next cell is left
+    std::vector<Wood> woods_;  // its own, the other one; none where no more than the next cell is left
 };
 
 }  // namespace crampfit
