@@ -92,6 +92,7 @@ SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double 
     find_joints(0, static_cast<int>(body.facets.size()) - 1);
     find_holds();
     const double h = body.layout.cell.minCoeff();
+    for (const Facet& f : body.facets) cut_off_.push_back(std::max(0.0, signed_depth(shape, f.position)));
     for (const Facet& f : body.facets)
         stiffness_.push_back(stiffness_in_cells * body.points.stiffest(f.point) / h * f.length * body.layout.thickness);
     if (friction_ > 0.0)
@@ -212,7 +213,7 @@ Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) c
         std::lower_bound(grips_.begin(), grips_.end(), touch.facet, [](const Grip& g, int facet) { return g.place < facet; });
     const bool is_kept = kept != grips_.end() && kept->place == touch.facet;
     const Vec2& before = place_[touch.facet];
-    const double depth_before = is_kept ? 0.0 : std::min(0.0, signed_depth(shape_, before));
+    const double depth_before = is_kept ? 0.0 : std::min(0.0, depth_of(touch.facet, before));
     return drag({touch.normal, touch.curvature, touch.force, touch.stiffness, depth, depth_before, place - before, in_steps_},
                 friction_, stiffness_[touch.facet], is_kept ? *kept : Grip{});
 }
@@ -231,8 +232,10 @@ double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displa
         double depth = 0.0, curvature = 0.0;
         Vec2 normal = Vec2::Zero();
         if (!depth_in(shape_, place_[grip.place], depth, normal, curvature)) continue;
+        depth -= cut_off_[grip.place];
+        if (depth <= 0.0) continue;
         // Share of the way.
-        const double touched = in_steps_ ? 1.0 : depth / (depth - std::min(0.0, signed_depth(shape_, place)));
+        const double touched = in_steps_ ? 1.0 : depth / (depth - std::min(0.0, depth_of(grip.place, place)));
         energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(normal));
     }
     return energy;
@@ -269,6 +272,9 @@ double SlidingBody::sunk_at(int facet) const {
     return (1.0 - place.share) * sunk_[place.station] + place.share * sunk_[place.station + 1];
 }
 
+// Of a facet that has gone there, against the body; below 0: so far outside [m].
+double SlidingBody::depth_of(int facet, const Vec2& place) const { return signed_depth(shape_, place) - cut_off_[facet]; }
+
 // Finds how far s the wood yields beyond the grid: s = A P^T N(d - P s), with the depths d of the facets against the grid, their
 // forces N and their shares P of the stations. By Newton's method, with a part of its step where the whole one does no good.
 void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement) {
@@ -284,7 +290,7 @@ void SlidingBody::sink(const Vec2& moved, const std::vector<Vec2>& displacement)
     std::vector<int> stations;
     for (const int i : near_) {
         if (!yield_->holds(i)) continue;
-        const double depth = signed_depth(shape_, current(i, displacement) - moved);
+        const double depth = depth_of(i, current(i, displacement) - moved);
         if (depth < -reach_in_cells * cell) continue;
         const LocalYield::Place& place = yield_->place(i);
         met.push_back({place.station, place.share, stiffness_[i], depth});
@@ -335,11 +341,13 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
         const Vec2 x = current(i, displacement) - moved;
         if (yield_ && yield_->holds(i)) {
             const Vec2 arm = x - std::get<Circle>(shape_).centre;
-            depth = std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i);
+            depth = std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i) - cut_off_[i];
             touch.normal = arm.normalized();
             touch.curvature = 1.0 / arm.norm();
         } else if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) {
             continue;
+        } else {
+            depth -= cut_off_[i];
         }
         const Press pressed = press(stiffness_[i], depth, onset);
         if (pressed.force <= 0.0) continue;

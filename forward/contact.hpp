@@ -23,7 +23,7 @@ bool is_small_circle(const Shape& shape, const Layout& layout);
 /// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of
 /// a crack: displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and
 /// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
-/// across.
+/// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is taken for cut off.
 class SlidingBody {
   public:
     SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
@@ -86,6 +86,7 @@ class SlidingBody {
     void find_holds();
     void sink(const Vec2& moved, const std::vector<Vec2>& displacement);
     double sunk_at(int facet) const;
+    double depth_of(int facet, const Vec2& place) const;
     Vec2 current(int facet, const std::vector<Vec2>& displacement) const;
 
     Shape shape_;
@@ -95,6 +96,7 @@ class SlidingBody {
     std::vector<Hold> holds_;        // by facet
     std::vector<int> first_hold_;    // [facets + 1]
     std::vector<double> stiffness_;  // [facets] [N/m]
+    std::vector<double> cut_off_;    // [facets] [m]
     std::vector<int> near_;          // facets that the body may touch before the list is made anew
     SearchInterval search_{1};
     Vec2 searched_at_ = Vec2::Zero();  // where the body had moved to at the last search [m]

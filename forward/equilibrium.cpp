@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -185,7 +186,8 @@ void Equilibrium::find_forces() {
         force_[pair.right] += pull;
         const Drag drag = face_drag(k);
         const Vec2 place = apart(k, displacement_);
-        push_faces(k, drag.force - face_stiffness(k) * place, [&](int field, const Vec2& push) { force_[field] += push; });
+        push_faces(k, drag.force - face_stiffness(k) * place,
+                   std::function([&](int field, const Vec2& push) { force_[field] += push; }));
         face_energy_ += 0.5 * place.dot(face_stiffness(k) * place) + drag.energy + drag.dissipated;
     }
     for (const Boundary::Traction& t : boundary_.tractions) {

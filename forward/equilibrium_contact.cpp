@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace crampfit {
@@ -64,6 +65,7 @@ void Equilibrium::push_faces(std::size_t k, const Vec2& push, const Add& add) co
     const double moment = -push.dot(left_of(apart(k, displacement_)));
     for (const FaceNormals::Share& share : normals_.shares(k)) add(share.field, moment * TurnSlope(polar, share.slope).angle);
 }
+template void Equilibrium::push_faces(std::size_t, const Vec2&, const std::function<void(int, const Vec2&)>&) const;
 
 // What holds the faces of a pair in their frame, `held`, and what more friction does there, joins the fields that turn the wood
 // about it; that between its own fields along the turned normal is with the factor already.

@@ -4,6 +4,7 @@
 #include "forward/side_by_side.hpp"
 
 #include <algorithm>
+#include <functional>
 
 namespace crampfit {
 
@@ -118,7 +119,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
             slope.potential[n] += 0.5 * stiffer * (tie * jump.squaredNorm() + place.dot(held * place));
             add(n, pair.left, stiffer * tie * jump);
             add(n, pair.right, -stiffer * tie * jump);
-            push_faces(k, stiffer * held * place, [&](int field, const Vec2& push) { add(n, field, push); });
+            push_faces(k, stiffer * held * place, std::function([&](int field, const Vec2& push) { add(n, field, push); }));
         }
     }
     for (const Boundary::Tied& tie : boundary_.tied) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace crampfit {
 
@@ -70,17 +71,28 @@ double splitting_motion(const Scene& scene, const Discretisation& body) {
 Travel travel_of(const Scene& scene) {
     Travel travel;
     double last = 0.0;
-    double first = infinity;
+    std::set<double> ends;
     for_drivers(scene, [&](const auto& driver) {
         if (speed_of(driver) == 0.0) return;
         travel.fastest = std::max(travel.fastest, speed_of(driver));
         const double until = driver.until.value_or(infinity);
-        first = std::min(first, until);
+        ends.insert(until);
         last = std::max(last, until);
     });
     if (travel.fastest > 0.0) travel.until = last;
-    travel.together = travel.fastest == 0.0 || first == last;
+    ends.erase(last);
+    travel.stops.assign(ends.begin(), ends.end());
     return travel;
+}
+
+Vec2 travel(const Scene& scene, int driver, double time) {
+    const auto edges = static_cast<int>(scene.edges.size());
+    const auto gone = [&](const Vec2& velocity, const std::optional<double>& until) -> Vec2 {
+        return velocity * std::min(time, until.value_or(infinity));
+    };
+    if (driver >= edges) return gone(scene.bodies[driver - edges].velocity, scene.bodies[driver - edges].until);
+    const Edge& edge = scene.edges[driver];
+    return gone({edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)}, edge.until);
 }
 
 std::string advice_on_holds(const Scene& scene) {

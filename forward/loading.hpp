@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace crampfit {
 
@@ -33,7 +34,8 @@ double farthest_motion(const Scene& scene, double end);
 /// toughness and the softest wood's stiffness, and half as far again for arrests [m].
 double splitting_motion(const Scene& scene, const Discretisation& body);
 
-/// What to say besides where no equilibrium is found: that along some axis frictionless bodies alone hold the specimen; else empty.
+/// What to say besides where no equilibrium is found: that along some axis frictionless bodies alone hold the specimen; else
+/// empty.
 std::string advice_on_holds(const Scene& scene);
 
 /// Whether there is a traction, or a force on a body, which do not go with time.
@@ -43,9 +45,12 @@ bool has_dead_load(const Scene& scene);
 struct Travel {
     double fastest = 0.0;                                    // [m/s]
     double until = std::numeric_limits<double>::infinity();  // all stand still from then on [s]
-    bool together = true;                                    // until the same time
+    std::vector<double> stops;                               // of some, while others go on [s]
 };
 
 Travel travel_of(const Scene& scene);
+
+/// How far an edge, or a body (numbered after the edges), has gone where that is prescribed [m].
+Vec2 travel(const Scene& scene, int driver, double time);
 
 }  // namespace crampfit

@@ -1,6 +1,7 @@
 #include "forward/quasistatic.hpp"
 
 #include "datasets/error.hpp"
+#include "forward/loading.hpp"
 #include "forward/side_by_side.hpp"
 
 #include <fmt/format.h>
@@ -44,6 +45,25 @@ constexpr double most_disagreement = 0.1;
 // a crack turns sharply the grid's does (`HardPath.ASharpTurn*`, by 0.1 %).
 constexpr double most_rise = 0.005;
 
+// At which equilibria are sought: in so many steps at least, none of which goes over a stop of something that moves. Right behind
+// a stop comes a time of its own, as the power of the load jumps there [s].
+std::vector<double> times_of_loading(const std::vector<double>& stops, double end, int steps) {
+    const double right_behind = 1e-9 * end;
+    std::vector<double> times{0.0};
+    const auto go_to = [&](double to) {
+        const double from = times.back(), parts = std::max(1.0, std::ceil(steps * (to - from) / end - 1e-6));
+        for (double k = 1.0; k < parts; ++k) times.push_back(from + k * ((to - from) / parts));
+        times.push_back(to);
+    };
+    for (const double stop : stops) {
+        if (stop >= end - right_behind) break;
+        go_to(stop);
+        times.push_back(stop + right_behind);
+    }
+    go_to(end);
+    return times;
+}
+
 Scene with_wide_cells(Scene scene) {
     scene.model.cell *= 2.0;
     return scene;
@@ -80,8 +100,9 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     numbers_ = MaterialSlope::of(scene, numbers, body_);
     if (numbers.empty()) equilibrium_.forget_yield_slopes();
     const double end = std::min(plan.end_time, plan.still_from);
-    last_time_ = plan.linear ? 2 : loading_steps;
-    time_step_ = (std::isfinite(end) && end > 0.0 ? end : 1.0) / last_time_;
+    times_ =
+        times_of_loading(travel_of(scene).stops, std::isfinite(end) && end > 0.0 ? end : 1.0, plan.linear ? 2 : loading_steps);
+    last_time_ = static_cast<int>(times_.size()) - 1;
     const double cell = body_.layout.cell.minCoeff();
     const int least_stations = plan.linear && growing_tips(scene) == 1 ? least_stations_where_cheap : least_stations_in_advance;
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k) {
@@ -100,6 +121,12 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
 }
 
 Quasistatic::~Quasistatic() = default;
+
+// The number of the last of the times that has come; of the end, beyond it.
+int Quasistatic::last_time_before(double time) const {
+    const auto beyond = std::ranges::upper_bound(times_, time);
+    return std::max(0, static_cast<int>(beyond - times_.begin()) - 1);
+}
 
 Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nullptr; }
 
@@ -373,6 +400,11 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
     if (place.parent >= 0)
         for (const auto& [t, known] : places_[place.parent].known) consider(known, true);
     const int least_parts = std::max(1, std::abs(time - from.time));
+    const auto time_at = [&](double share) {  // each time between is one of these
+        const double at = std::lerp(from.time, time, share);
+        const int before = std::min(static_cast<int>(at), last_time_ - 1);
+        return std::lerp(time_of(before), time_of(before + 1), at - before);
+    };
     for (int parts = least_parts; parts <= most_parts * least_parts; parts *= 2) {
         equilibrium_.set_displacements(from.displacement, time_of(from.time), from.contacts);
         bool good = true;
@@ -388,8 +420,7 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
         double potential = from.potential;
         double power = from.power;
         for (int part = 1; part <= parts && good; ++part) {
-            good = solve_from(potential, power, equilibrium_.time(),
-                              std::lerp(time_of(from.time), time_of(time), static_cast<double>(part) / parts));
+            good = solve_from(potential, power, equilibrium_.time(), time_at(static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
         }
@@ -498,7 +529,7 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
     const int number = way_[station_number];
     const Station& station = places_[number].station;
     if (!plan_.linear) {
-        const int low = std::clamp(static_cast<int>(time / time_step_), 0, last_time_ - 1);
+        const int low = std::min(last_time_before(time), last_time_ - 1);
         const bool between = time > time_of(low);
         if (!know(number, low) || (between && !know(number, low + 1))) fail();
         if (between && !station.states.count(low + 1) && station.states.count(low)) time = time_of(low);

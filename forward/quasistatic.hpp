@@ -202,7 +202,8 @@ class Quasistatic {
     LoadState load_state(const Missed& missed) const;
     bool parted(std::size_t number) const;
     LoadState nothing(double time) const;
-    double time_of(int number) const { return number * time_step_; }
+    double time_of(int number) const { return times_[number]; }
+    int last_time_before(double time) const;
 
     const Scene& scene_;
     const Plan& plan_;
@@ -221,7 +222,7 @@ class Quasistatic {
     std::deque<int> coming_;            // that the way goes on through, as far as it is told
     int closer_ = 1;                    // so much closer may stations stand: 1, 2 or 4
     std::map<unsigned, double> tried_;  // by front: its critical time when it was tried last, times `drive` then
-    double time_step_ = 0;              // between two times at which equilibria are known [s]
+    std::vector<double> times_;         // at which equilibria are known [s]
     int last_time_ = 0;                 // number of the last of them
     std::string failure_;
     int failed_time_ = 0;  // the last one without an equilibrium

@@ -90,9 +90,7 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.
-int Quasistatic::time_until(double now) const {
-    return plan_.linear ? last_time_ : std::clamp(static_cast<int>(now / time_step_), 1, last_time_);
-}
+int Quasistatic::time_until(double now) const { return plan_.linear ? last_time_ : std::max(1, last_time_before(now)); }
 
 // The place where tips have gone on by a step; -1 where there is no equilibrium.
 int Quasistatic::next(int number, Step step, double now) {
@@ -351,7 +349,7 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
         for (const int time : {0, 1, 2}) know_ahead(number, time);
         return judge();
     }
-    int low = std::min(static_cast<int>(now / time_step_), last_time_ - 1);
+    int low = std::min(last_time_before(now), last_time_ - 1);
     int high = low + 1;
     const auto missing = [&]() -> Critical {
         fail();
@@ -392,7 +390,7 @@ Quasistatic::Critical Quasistatic::critical_of_front(int number, const MaterialM
             continue;
         }
         // Good where it lies between two states that stand next to each other, or where it has been due before.
-        const int before = static_cast<int>(found.time / time_step_);
+        const int before = last_time_before(found.time);
         if (found.time <= now || before >= last_time_) return found;
         if (station.ahead_known(before) && station.ahead_known(before + 1)) return found;
         low = std::max(0, before);

@@ -87,7 +87,7 @@ std::optional<Quasistatic::Slopes> Quasistatic::slopes_at(Equilibrium& equilibri
     const Gauges gauges(scene_);
     std::vector<std::vector<Vec2>> drives(2, std::vector<Vec2>(boundary.drivers(), Vec2::Zero()));
     for (int d = 0; d < boundary.drivers(); ++d)
-        if (equilibrium.time() < boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
+        if (equilibrium.time() <= boundary.travel_time(d)) drives[0][d] = boundary.velocity_of(d);
     drives[1][gauges.force] = gauges.force_direction;
     std::vector<Equilibrium::Motion> motions;
     if (goes_with_load(equilibrium, drives[0])) {
@@ -255,7 +255,7 @@ std::vector<Vec2> Quasistatic::probes_at(std::size_t station_number, double time
     if (place.probes.empty()) return {};
     // Without an equilibrium before it nothing has moved when the load begins; a rough walk may know none after it.
     const double t = std::min(time, plan_.still_from);
-    auto after = place.probes.lower_bound(plan_.linear ? last_time_ : std::min(static_cast<int>(t / time_step_) + 1, last_time_));
+    auto after = place.probes.lower_bound(plan_.linear ? last_time_ : std::min(last_time_before(t) + 1, last_time_));
     if (after == place.probes.end()) --after;
     const bool first = after == place.probes.begin();
     const double from = first ? 0.0 : time_of(std::prev(after)->first);

@@ -1,8 +1,10 @@
 #include "forward/simulate.hpp"
 
+#include "forward/contact_limits.hpp"
 #include "forward/deformation.hpp"
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
+#include "forward/loading.hpp"
 #include "forward/march.hpp"
 #include "forward/probes.hpp"
 #include "forward/quasistatic.hpp"
@@ -134,6 +136,20 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
         fmt::format("; small strain: turns of the wood would change the force by {:+.1f} % at {:.3g} mm, see solver.strain = "
                     "\"finite rotation\"",
                     100.0 * (with / without - 1.0), 1e3 * last->displacement);
+}
+
+// Says so where contact at the end is more than its models hold for.
+void judge_contact(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
+                   Quasistatic& walk, Record& record) {
+    if (plan.linear) return;
+    const SeriesPlace last{record.series.size() - 1, 0.0};
+    Revisit revisit(scene, plan, materials, body, walk);
+    if (!revisit.to(record, last)) return;
+    const Equilibrium& equilibrium = revisit.equilibrium();
+    std::vector<Vec2> moved;
+    for (int driver = equilibrium.boundary().first_body(); driver < equilibrium.boundary().drivers(); ++driver)
+        moved.push_back(travel(scene, driver, equilibrium.time()) + equilibrium.contacts().moved[driver]);
+    record.message += beyond_contact(scene, revisit.body(), equilibrium.cracks(), equilibrium.displacements(), moved);
 }
 
 // How much wood there is straight ahead of a point [m].
@@ -314,6 +330,7 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     if (scene.output.frames > 0) draw_frames(scene, plan, materials, body, walk, options, record);
     read_probes(scene, walk, record);
     judge_small_strain(scene, plan, materials, body, walk, record);
+    judge_contact(scene, plan, materials, body, walk, record);
     judge_advance(scene, body, record);
     return record;
 }
@@ -349,6 +366,9 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     Record record = recorder.take();
     judge_turns(plan, body, solver.displacements(), record);
     judge_books(record);
+    std::vector<Vec2> moved;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) moved.push_back(solver.moved(static_cast<int>(scene.edges.size() + b)));
+    record.message += beyond_contact(scene, body, solver.cracks(), solver.displacements(), moved);
     if (solver.fastest_crack() > 0.0) record.message += fmt::format("; crack at up to {:.3g} m/s", solver.fastest_crack());
     return record;
 }

@@ -2,6 +2,7 @@
 
 #include "forward/boundary.hpp"
 #include "forward/load_peak.hpp"
+#include "forward/loading.hpp"
 #include "forward/recorder.hpp"
 
 #include <algorithm>
@@ -65,6 +66,8 @@ class Tracer {
         : scene_(scene), plan_(plan), materials_(materials), walk_(walk), go_on_(go_on), gauges_(scene),
           tracked_(tracked_tip(scene)) {
         sample_ = plan.end_time / scene.output.samples;
+        stops_ = travel_of(scene).stops;
+        stops_.push_back(plan.still_from);
         for (const Edge& edge : scene.edges) record_.reactions.push_back({edge.name, {}});
         for (const Body& body : scene.bodies) record_.reactions.push_back({body.name, {}});
         record_.cracks.resize(scene.cracks.size());
@@ -122,6 +125,7 @@ class Tracer {
 
     void follow() {
         Moment here = moment_at_rest();
+        if (!walk_.failure().empty()) here.load.displacement = 0.0;  // where a search for an equilibrium has ended means nothing
         add(here, false);
         if (beyond_displacement(here) || beyond_length(here)) return end(RunStatus::finished, met);
         if (!know_station(0, 0.0)) {
@@ -306,13 +310,14 @@ class Tracer {
         if (!done_ && until > from.load.time) go(from, moment(i, until));
     }
 
-    // There is one where all motion ends: power goes in a step there.
+    // There is one where some or all motion ends: the load's power goes in a step there.
     double next_sample(double time) {
         while (!std::isfinite(end_time()) && time >= sample_ * scene_.output.samples) sample_ *= 2.0;
         const double next = (std::floor(time / sample_ + rounding) + 1.0) * sample_;
-        return moves_at(time) ? std::min(next, plan_.still_from) : next;
+        for (const double stop : stops_)
+            if (time < stop - rounding * sample_) return std::min(next, stop);
+        return next;
     }
-    bool moves_at(double time) const { return time < plan_.still_from - rounding * sample_; }
 
     void add(const Moment& m, bool jumped) {
         if (!record_.series.empty() && m.load.time <= record_.series.back().time) return;
@@ -344,9 +349,10 @@ class Tracer {
         row.fracture_energy = m.fracture_energy;
         if (!record_.series.empty()) {
             const Moment& before = last_;
-            const double moved = moves_at(before.load.time) ? m.load.time - before.load.time : 0.0;
-            const double work =
-                0.5 * (before.load.power + m.load.power) * moved + m.load.traction_work - before.load.traction_work;
+            double work = m.load.traction_work - before.load.traction_work;
+            for (int d = 0; d < static_cast<int>(m.load.reactions.size()); ++d)
+                work += 0.5 * (before.load.reactions[d] + m.load.reactions[d])
+                                  .dot(travel(scene_, d, m.load.time) - travel(scene_, d, before.load.time));
             row.external_work = record_.series.back().external_work + work;
             // A jump turns what it releases beyond the toughness into motion, which is not followed.
             if (!jumped)
@@ -417,6 +423,7 @@ class Tracer {
     std::vector<double> toughness_;        // [stations] overcome then [J/m^2]
     std::vector<double> fracture_energy_;  // [stations] [J]
     double sample_ = 0;                    // [s]
+    std::vector<double> stops_;            // of what moves [s]
     Record record_;
     Moment last_;
     bool done_ = false;

@@ -390,5 +390,94 @@ TEST(VerificationWedgeForce, RisesSmoothlyAsTheWheelsRoll) {
     EXPECT_LT(worst, 0.02);  // one facet a point, on the staircase: 4.2 %
 }
 
+TEST(UnitContact, WhatABodyOverlapsAtTheStartIsCutOff) {
+    // By a rounding of 1 um or a fifth of a cell: it starts without force, and gets out no more than what was put in.
+    for (const auto kind : {SolverKind::quasistatic, SolverKind::explicit_dynamics}) {
+        for (const double overlap : {1e-6, 0.04e-3}) {
+            Scene scene = block({10e-3, 5e-3}, 0.2e-3);
+            scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.bodies = {sliding("wheel", Circle{Vec2(5e-3, 7e-3 - overlap), 2e-3}, {0.0, -0.2})};
+            scene.measure = {"wheel", "wheel"};
+            scene.solver.kind = kind;
+            scene.stop.displacement = 0.1e-3;
+            scene.output.samples = 20;
+            const Record record = simulate(scene);
+            ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+            EXPECT_EQ(record.series.front().force, 0.0);
+            EXPECT_LT(record.worst_energy_imbalance, 0.005) << overlap;
+            EXPECT_GT(record.series.back().force, 0.0);
+        }
+    }
+}
+
+// A block cut through half way up: the upper part goes to the right, and down by a hundredth of that.
+Scene sliding_parts(double way) {
+    Scene scene = block({10e-3, 10e-3}, 0.5e-3);
+    scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0}), moving("top", Side::top, {1.0, -0.01})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 5.1e-3), Vec2(10e-3, 5.1e-3)};
+    crack.grows = Growth::none;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.solver.strain = StrainMeasure::finite_rotation;
+    scene.stop.time = way;
+    scene.output.samples = 10;
+    return scene;
+}
+
+TEST(UnitContact, SaysWhereItsModelsEnd) {
+    EXPECT_EQ(simulate(sliding_parts(0.4e-3)).message.find("slid along"), std::string::npos);
+    EXPECT_NE(simulate(sliding_parts(1e-3)).message.find("slid along"), std::string::npos);
+
+    // A tool goes down into a notch of right angle: its bottom's corners meet the flanks, or rounded ends do.
+    for (const bool is_sharp : {true, false}) {
+        Scene scene = block({20e-3, 10e-3}, 0.5e-3);
+        scene.specimen.cutouts = {Polygon{{Vec2(7e-3, 10e-3), Vec2(13e-3, 10e-3), Vec2(10e-3, 7e-3)}}};
+        scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0})};
+        Polygon tool{{Vec2(9e-3, 8e-3), Vec2(11e-3, 8e-3), Vec2(11e-3, 12e-3), Vec2(9e-3, 12e-3)}};
+        scene.bodies = {sliding("tool", tool, {0.0, -1.0})};
+        if (!is_sharp) scene.bodies[0].shape = Circle{Vec2(10e-3, 7e-3 + std::sqrt(2.0) * 1e-3), 1e-3};
+        scene.measure = {"tool", "tool"};
+        scene.solver.kind = SolverKind::quasistatic;
+        scene.stop.time = 0.05e-3;
+        scene.output.samples = 10;
+        EXPECT_EQ(simulate(scene).message.find("sharp corner") != std::string::npos, is_sharp) << is_sharp;
+    }
+
+    // A wheel is driven from a funnel into a crack, or only toward it.
+    for (const double way : {4e-3, 6.4e-3}) {
+        Scene scene = block({40e-3, 20e-3}, 0.5e-3);
+        scene.specimen.cutouts = {
+            Polygon{{Vec2(0.0, 9e-3), Vec2(10e-3, 9e-3), Vec2(14e-3, 10e-3), Vec2(10e-3, 11e-3), Vec2(0.0, 11e-3)}}};
+        scene.edges = {moving("right", Side::right, {0.0, 0.0})};
+        scene.bodies = {sliding("wheel", Circle{Vec2(8e-3, 10e-3), 1e-3}, {1.0, 0.0})};
+        Crack crack;
+        crack.points = {Vec2(13.9e-3, 10e-3), Vec2(30e-3, 10e-3)};
+        crack.grows = Growth::none;
+        scene.cracks = {crack};
+        scene.measure = {"wheel", "wheel"};
+        scene.solver.kind = SolverKind::quasistatic;
+        scene.stop.time = way;
+        EXPECT_EQ(simulate(scene).message.find("come over faces") != std::string::npos, way > 5e-3) << way;
+    }
+}
+
+TEST(UnitContact, AWheelThatFindsNoRestHasNoEquilibrium) {
+    // A force takes it down beside the middle of a notch: it rolls off the one flank that it touches.
+    Scene scene = notched(slope_two, 3e-3, 1e-3, 0.2e-3);
+    scene.bodies.resize(1);
+    Body& wheel = scene.bodies[0];
+    wheel.shape = Circle{Vec2(5.05e-3, 9.346e-3), 1e-3};
+    wheel.velocity = Vec2::Zero();
+    wheel.free = {true, true};
+    wheel.force = {0.0, -5.0};
+    scene.stop = {};
+    scene.stop.displacement = 0.6e-3;
+    const Record record = simulate(scene);
+    if (record.status == RunStatus::finished) EXPECT_NEAR(record.series.back().force, 5.0, 0.01);
+    else EXPECT_EQ(record.status, RunStatus::unstable);
+}
+
 }  // namespace
 }  // namespace crampfit::test

@@ -388,5 +388,27 @@ TEST(UnitEquilibrium, ComesBackToWhatItSaved) {
     EXPECT_NEAR(run.equilibrium.reactions()[0].y(), force, 1e-9 * force);
 }
 
+TEST(UnitEquilibrium, UnloadsAsItWasLoaded) {
+    // The top stops at 0.37 of the time, the bottom follows it until nothing is left.
+    Scene scene = block({10e-3, 5e-3}, 0.5e-3);
+    scene.edges = {moving("bottom", Side::bottom, {0.0, -0.37}), moving("top", Side::top, {0.0, -1.0})};
+    scene.edges[1].until = 0.37e-4;
+    scene.measure = {"top", "top"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.solver.strain = StrainMeasure::small;
+    scene.stop.time = 1e-4;
+    scene.output.samples = 40;
+    const Record record = simulate(scene);
+    ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+    const auto closer = [](double time) { return std::min(time, 0.37e-4) - 0.37 * time; };
+    const auto& rows = record.series;
+    const auto peak = std::ranges::max_element(rows, {}, &Instant::force);
+    EXPECT_EQ(peak->time, 0.37e-4);
+    for (const Instant& row : rows) {
+        EXPECT_NEAR(row.force, peak->force * closer(row.time) / closer(peak->time), 1e-6 * peak->force) << row.time;
+        EXPECT_NEAR(row.external_work, row.strain_energy, 1e-6 * peak->strain_energy) << row.time;
+    }
+}
+
 }  // namespace
 }  // namespace crampfit::test

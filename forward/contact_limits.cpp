@@ -1,0 +1,129 @@
+#include "forward/contact_limits.hpp"
+
+#include "forward/boundary.hpp"
+#include "forward/deformation.hpp"
+#include "forward/geometry.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace crampfit {
+
+namespace {
+
+constexpr double counts_as_overlap = 0.1;  // depth of a face in a body [cells]
+constexpr double beside = 0.25;            // of a crack there is wood on both sides [cells]
+constexpr double near_corner = 0.75;       // [cells]
+constexpr double least_to_sides = 0.26;    // sine of the angle from a corner's sides to the wood that lies about it [15 degrees]
+
+// A place on a crack with wood on both sides, as they lie now.
+struct Face {
+    Vec2 at_rest, left, right;  // [m]
+    Vec2 normal;                // unit, from right to left
+};
+
+// Those of pairs that the crack has freed.
+std::vector<std::pair<int, Face>> faces_of(const Discretisation& body, const CrackFields& cracks,
+                                           const std::vector<Vec2>& displacement) {
+    const std::vector<double> mass = field_masses(body, cracks.fields());
+    const double step = beside * body.layout.cell.minCoeff();
+    std::vector<std::pair<int, Face>> found;
+    for (const FieldPair& pair : cracks.pairs) {
+        if (pair.freed < 1.0 || mass[pair.left] == 0.0 || mass[pair.right] == 0.0) continue;
+        const Vec2 node = body.layout.node_position(pair.node);
+        const std::vector<Vec2>& line = cracks.lines[pair.crack].points;
+        Vec2 foot = line[0];
+        for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+            const Vec2 there = line[k] + nearest_on_segment(line[k], line[k + 1], node) * (line[k + 1] - line[k]);
+            if ((there - node).norm() < (foot - node).norm()) foot = there;
+        }
+        const int left = body.point_at(foot + step * pair.normal), right = body.point_at(foot - step * pair.normal);
+        if (left < 0 || right < 0) continue;
+        const Mat2 turn = Polar(gradient_at(body, right, displacement)).turn;
+        found.push_back(
+            {pair.crack, {foot, foot + displacement[pair.left], foot + displacement[pair.right], turn * pair.normal}});
+    }
+    return found;
+}
+
+std::string in_mm(const Vec2& x) { return fmt::format("x = {:.4g}, y = {:.4g} mm", 1e3 * x.x(), 1e3 * x.y()); }
+
+// A convex corner of a polygon that presses on wood whose own normal lies well between those of the corner's sides.
+bool presses_on(const std::vector<Vec2>& corners, std::size_t k, const Shape& shape, const Discretisation& body,
+                const std::vector<Vec2>& displacement, const Vec2& moved) {
+    const std::size_t n = corners.size();
+    const Vec2 before = corners[k] - corners[(k + n - 1) % n], after = corners[(k + 1) % n] - corners[k];
+    const auto out_of = [&](const Vec2& side) -> Vec2 {
+        const Vec2 normal = left_of(side).normalized();
+        return inside(shape, corners[k] - 0.5 * side + 1e-6 * side.norm() * normal) ? -normal : normal;
+    };
+    const Vec2 first = out_of(before), second = [&] {
+        const Vec2 normal = left_of(after).normalized();
+        return inside(shape, Vec2(corners[k] + 0.5 * after + 1e-6 * after.norm() * normal)) ? Vec2(-normal) : normal;
+    }();
+    if (inside(shape, corners[k] + 1e-6 * std::min(before.norm(), after.norm()) * (first + second).normalized())) return false;
+    const double cell = body.layout.cell.minCoeff();
+    for (const Facet& facet : body.facets) {
+        Vec2 x = facet.position - moved;
+        const auto nodes = body.points.node[facet.point];
+        for (int i = 0; i < body.layout.nodes_per_cell(); ++i) x += facet.weight[i] * displacement[nodes[i]];
+        if ((x - corners[k]).norm() > near_corner * cell || !inside(shape, x)) continue;
+        const Vec2 toward = -(Polar(gradient_at(body, facet.point, displacement)).turn * facet.normal);
+        const double sine = first.x() * second.y() - first.y() * second.x();
+        const double from_first = (first.x() * toward.y() - first.y() * toward.x()) * (sine > 0.0 ? 1.0 : -1.0);
+        const double to_second = (toward.x() * second.y() - toward.y() * second.x()) * (sine > 0.0 ? 1.0 : -1.0);
+        if (toward.dot(first + second) > 0.0 && from_first > least_to_sides && to_second > least_to_sides) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+std::string beyond_contact(const Scene& scene, const Discretisation& body, const CrackFields& cracks,
+                           const std::vector<Vec2>& displacement, const std::vector<Vec2>& moved) {
+    const double cell = body.layout.cell.minCoeff();
+    const auto faces = faces_of(body, cracks, displacement);
+    std::string text;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+        const Body& rigid = scene.bodies[b];
+        if (rigid.contact.kind == Contact::Kind::bonded) continue;
+        for (const auto& [crack, face] : faces) {
+            const auto depth = [&](const Vec2& x) {
+                const Vec2 there = x - moved[b];
+                return inside(rigid.shape, there) ? nearest_on_outline(rigid.shape, there).distance : 0.0;
+            };
+            if (std::max(depth(face.left), depth(face.right)) < counts_as_overlap * cell) continue;
+            text += fmt::format(
+                "; bodies.{} has come over faces of cracks.{}, about {}, which bodies do not touch: do not trust its force, and "
+                "draw a crack that it shall open as a cutout",
+                rigid.name, crack, in_mm(face.at_rest));
+            break;
+        }
+        const auto* polygon = std::get_if<Polygon>(&rigid.shape);
+        for (std::size_t k = 0; polygon && k < polygon->points.size(); ++k) {
+            if (!presses_on(polygon->points, k, rigid.shape, body, displacement, moved[b])) continue;
+            text +=
+                fmt::format("; a sharp corner of bodies.{} presses on the wood, about {}: the grid cannot tell which way, do not "
+                            "trust its force, and round it by two cells",
+                            rigid.name, in_mm(polygon->points[k] + moved[b]));
+            break;
+        }
+    }
+    for (int crack = 0; crack < static_cast<int>(scene.cracks.size()); ++crack) {
+        double most = 0.0;
+        for (const auto& [of, face] : faces) {
+            const Vec2 jump = face.left - face.right;
+            if (of == crack && jump.dot(face.normal) < 0.0) most = std::max(most, std::abs(jump.dot(left_of(face.normal))));
+        }
+        if (most > cell)
+            text += fmt::format("; faces of cracks.{} that press have slid along each other by up to {:.3g} mm: what faced each "
+                                "other at first is taken to press, which with more than a cell of {:.3g} mm is off by tens of "
+                                "percent",
+                                crack, 1e3 * most, 1e3 * cell);
+    }
+    return text;
+}
+
+}  // namespace crampfit
