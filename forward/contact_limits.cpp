@@ -16,6 +16,7 @@ namespace {
 constexpr double counts_as_overlap = 0.1;  // depth of a face in a body [cells]
 constexpr double beside = 0.25;            // of a crack there is wood on both sides [cells]
 constexpr double near_corner = 0.75;       // [cells]
+constexpr double deep_in_bonded = 0.25;    // [cells]
 constexpr double least_to_sides = 0.26;    // sine of the angle from a corner's sides to the wood that lies about it [15 degrees]
 
 // A place on a crack with wood on both sides, as they lie now.
@@ -50,6 +51,13 @@ std::vector<std::pair<int, Face>> faces_of(const Discretisation& body, const Cra
 
 std::string in_mm(const Vec2& x) { return fmt::format("x = {:.4g}, y = {:.4g} mm", 1e3 * x.x(), 1e3 * x.y()); }
 
+Vec2 place_of(const Facet& facet, const Discretisation& body, const std::vector<Vec2>& displacement) {
+    Vec2 x = facet.position;
+    const auto nodes = body.points.node[facet.point];
+    for (int i = 0; i < body.layout.nodes_per_cell(); ++i) x += facet.weight[i] * displacement[nodes[i]];
+    return x;
+}
+
 // A convex corner of a polygon that presses on wood whose own normal lies well between those of the corner's sides.
 bool presses_on(const std::vector<Vec2>& corners, std::size_t k, const Shape& shape, const Discretisation& body,
                 const std::vector<Vec2>& displacement, const Vec2& moved) {
@@ -66,9 +74,7 @@ bool presses_on(const std::vector<Vec2>& corners, std::size_t k, const Shape& sh
     if (inside(shape, corners[k] + 1e-6 * std::min(before.norm(), after.norm()) * (first + second).normalized())) return false;
     const double cell = body.layout.cell.minCoeff();
     for (const Facet& facet : body.facets) {
-        Vec2 x = facet.position - moved;
-        const auto nodes = body.points.node[facet.point];
-        for (int i = 0; i < body.layout.nodes_per_cell(); ++i) x += facet.weight[i] * displacement[nodes[i]];
+        const Vec2 x = place_of(facet, body, displacement) - moved;
         if ((x - corners[k]).norm() > near_corner * cell || !inside(shape, x)) continue;
         const Vec2 toward = -(Polar(gradient_at(body, facet.point, displacement)).turn * facet.normal);
         const double sine = first.x() * second.y() - first.y() * second.x();
@@ -88,7 +94,19 @@ std::string beyond_contact(const Scene& scene, const Discretisation& body, const
     std::string text;
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         const Body& rigid = scene.bodies[b];
-        if (rigid.contact.kind == Contact::Kind::bonded) continue;
+        if (rigid.contact.kind == Contact::Kind::bonded) {
+            const bool is_over_wood = std::ranges::any_of(body.facets, [&](const Facet& facet) {
+                const Vec2 x = place_of(facet, body, displacement) - moved[b];
+                return !inside(rigid.shape, facet.position) && inside(rigid.shape, x) &&
+                       nearest_on_outline(rigid.shape, x).distance > deep_in_bonded * cell;
+            });
+            if (is_over_wood)
+                text +=
+                    fmt::format("; bodies.{} lies over wood that it did not hold at the start: bonded bodies press on nothing "
+                                "else",
+                                rigid.name);
+            continue;
+        }
         for (const auto& [crack, face] : faces) {
             const auto depth = [&](const Vec2& x) {
                 const Vec2 there = x - moved[b];

@@ -372,6 +372,11 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     check_bodies(scene, body);
     check_cracks(scene, body);
+    for (const Edge& edge : scene.edges)
+        if (edge.name == scene.measure.displacement && edge.traction && edge.traction->isZero(0.0))
+            refuse(
+                scene, "edges." + edge.name + ".traction", "0 MPa, 0 MPa",
+                "measure.displacement goes along the traction of this edge, which says no direction: a small one does, as 1 Pa");
     if (!may_end(scene))
         refuse(scene, "stop",
                scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
@@ -590,7 +595,8 @@ std::string describe(const Scene& scene, const Plan& plan, const Discretisation&
         text += fmt::format("{:<15} the load takes {:.3g} wave transits of the specimen; vibration is felt below about 50\n",
                             "loading", plan.slowness);
     } else {
-        text += fmt::format("{:<15} not known before the run: no stop condition on time or displacement\n", "cost");
+        text += fmt::format(
+            "{:<15} not known before the run: no stop condition on time, nor on a displacement that is prescribed\n", "cost");
     }
     return text;
 }

@@ -141,7 +141,7 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
 // Says so where contact at the end is more than its models hold for.
 void judge_contact(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                    Quasistatic& walk, Record& record) {
-    if (plan.linear) return;
+    if (plan.linear && scene.bodies.empty()) return;
     const SeriesPlace last{record.series.size() - 1, 0.0};
     Revisit revisit(scene, plan, materials, body, walk);
     if (!revisit.to(record, last)) return;
@@ -335,18 +335,50 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
     return record;
 }
 
+// Under loads that do not change any more: whether a specimen has swung for so long since something last went farther than before
+// that no stop condition will be met.
+class Standstill {
+  public:
+    Standstill(const Scene& scene, const Plan& plan) {
+        const Travel travel = travel_of(scene);
+        since_ = last_ = std::isfinite(plan.end_time) ? plan.end_time : travel.fastest > 0.0 ? travel.until : 0.0;
+        least_ = steps_across * plan.time_step * scene.specimen.size.maxCoeff() / scene.model.cell;
+    }
+
+    bool goes_on_after(const Instant& now) {
+        if (now.time <= since_) return true;
+        if (std::abs(now.displacement) > (1.0 + counts) * farthest_ || now.crack_length > longest_) {
+            farthest_ = std::max(farthest_, std::abs(now.displacement));
+            longest_ = std::max(longest_, now.crack_length);
+            last_ = now.time;
+        }
+        return now.time - since_ <= times_as_long * (last_ - since_) + least_;
+    }
+
+  private:
+    static constexpr double counts = 1e-3, times_as_long = 10.0, steps_across = 40.0;
+    double since_, last_, least_;            // [s]
+    double farthest_ = 0.0, longest_ = 0.0;  // [m]
+};
+
 Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& materials, Discretisation& body,
                     const SimulateOptions& options) {
     ExplicitSolver solver(scene, plan, materials, body, std::min(options.threads, 1 + body.points.count() / points_a_thread));
     Recorder recorder(scene, plan, body, solver);
+    Standstill standstill(scene, plan);
     for (long step = 0;; ++step) {
         recorder.look();
         if (!recorder.is_finite()) {
             recorder.finish(RunStatus::unstable, {});
             break;
         }
-        if (reached(scene.stop, recorder.now())) {
+        const Instant now = recorder.now();
+        if (reached(scene.stop, now)) {
             recorder.finish(RunStatus::finished, "a stop condition was met");
+            break;
+        }
+        if (!standstill.goes_on_after(now)) {
+            recorder.finish(RunStatus::finished, "under a constant load nothing goes on: no stop condition can be met");
             break;
         }
         if (plan.grows && all_growing_tips_left(scene, solver)) {

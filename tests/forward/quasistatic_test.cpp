@@ -685,6 +685,25 @@ TEST(UnitWalk, WhatALoadFromTheStartMakesGrowIsInTheSeries) {
     EXPECT_EQ(through.status, RunStatus::split) << through.message;
 }
 
+TEST(UnitStop, UnderAConstantLoadARunEndsWhereNothingGoesOn) {
+    // In motion a bar is pulled to twice what it is at rest (0.1 mm), not to five times as much.
+    Scene scene = block({10e-3, 10e-3}, 2e-3);
+    scene.materials["EW"] = {1e9, 0.0, 300.0, 100.0};
+    scene.edges = {moving("bottom", Side::bottom, {0.0, 0.0}), pulled("top", Side::top, {0.0, 5e6})};
+    scene.measure = {"top", "top"};
+    scene.stop = {};
+    scene.solver.kind = SolverKind::explicit_dynamics;
+    for (const double far : {0.09e-3, 0.25e-3}) {
+        scene.stop.displacement = far;
+        const Record record = simulate(scene);
+        EXPECT_EQ(record.status, RunStatus::finished);
+        EXPECT_EQ(record.message.find("nothing goes on") != std::string::npos, far > 0.1e-3) << record.message;
+        EXPECT_LT(record.steps, 10000);
+    }
+    scene.edges[1].traction = Vec2::Zero();
+    EXPECT_THROW(simulate(scene), InputError);  // a transducer without a direction
+}
+
 TEST(UnitWalk, SaysSoWhereNothingResists) {
     Scene scene = at_equilibrium(block({10e-3, 10e-3}, 1e-3));
     scene.edges = {moving("top", Side::top, {0.0, 1e-3})};  // holds the specimen by itself, and takes it along
