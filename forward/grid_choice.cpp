@@ -11,6 +11,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace crampfit {
@@ -25,7 +26,11 @@ constexpr double most_cells_tried = 128;
 constexpr double most_advances_a_cell = 2.0;
 
 constexpr double most_cells_chosen = 512;
-constexpr int multiple = 4;      // of cells: places on lines of the grids tried lie on lines of the chosen one
+constexpr int multiple = 4;  // of cells: places on lines of the grids tried lie on lines of the chosen one
+// An error below this one asks for cells that show bands of stiff wood.
+constexpr double least_for_bands = 0.02;
+constexpr double cells_in_band = 2.0, most_cells_for_bands = 256;
+
 constexpr double safety = 1.25;  // Roache's, for three grids
 constexpr double least_power = 0.5;
 constexpr double most_power = 2.0;
@@ -165,6 +170,48 @@ double fewest_cells(const std::vector<Estimate>& estimates, double asked, double
     return cells;
 }
 
+// How wide bands of wood that is much stiffer than other are: most of it lies in such or wider ones; none where there is no such
+// wood [m].
+std::optional<double> width_of_bands(const Scene& scene) {
+    constexpr int samples = 512;  // across the smaller side
+    constexpr double most = 0.7, much_stiffer = 4.0, stiff = 0.5;
+    const MaterialMap materials(scene);
+    const double pitch = scene.specimen.size.minCoeff() / samples;
+    const int columns = static_cast<int>(scene.specimen.size.x() / pitch),
+              rows = static_cast<int>(scene.specimen.size.y() / pitch);
+    std::vector<double> stiffness(static_cast<std::size_t>(columns) * rows);
+    for (int j = 0; j < rows; ++j)
+        for (int i = 0; i < columns; ++i) {
+            const Eigen::Matrix3d wood = materials.at(pitch * Vec2(i + 0.5, j + 0.5)).elasticity.stiffness();
+            stiffness[static_cast<std::size_t>(j) * columns + i] = std::max(wood(0, 0), wood(1, 1));
+        }
+    const double stiffest = std::ranges::max(stiffness);
+    if (std::ranges::none_of(stiffness, [&](double one) { return one > 0.0 && one * much_stiffer < stiffest; })) return {};
+    // Along a row or column, by the stretch that it is in.
+    std::vector<int> width(stiffness.size(), std::numeric_limits<int>::max());
+    const auto note = [&](int count, const auto& place) {
+        for (int k = 0, from = 0; k <= count; ++k) {
+            if (k < count && stiffness[place(k)] >= stiff * stiffest) continue;
+            for (int l = from; l < k; ++l) width[place(l)] = std::min(width[place(l)], k - from);
+            from = k + 1;
+        }
+    };
+    for (int j = 0; j < rows; ++j) note(columns, [&](int i) { return static_cast<std::size_t>(j) * columns + i; });
+    for (int i = 0; i < columns; ++i) note(rows, [&](int j) { return static_cast<std::size_t>(j) * columns + i; });
+    std::erase(width, std::numeric_limits<int>::max());
+    const auto narrow = width.begin() + static_cast<std::ptrdiff_t>((1.0 - most) * static_cast<double>(width.size()));
+    std::ranges::nth_element(width, narrow);
+    return *narrow * pitch;
+}
+
+// Errors of bands of less than two cells come and go with where they lie in these: two grids that agree tell little.
+double cells_for_bands(const Scene& scene, double cells) {
+    const auto width = width_of_bands(scene);
+    if (!width) return cells;
+    const double needed = multiple * std::ceil(cells_in_band * scene.specimen.size.minCoeff() / *width / multiple - 1e-9);
+    return needed > most_cells_for_bands ? cells : std::max(cells, needed);
+}
+
 [[noreturn]] void refuse(const Scene& scene, double error, const std::string& rule) {
     throw InputError(scene.file.string(), "model.error", fmt::format("{:g} %", 100 * error), rule);
 }
@@ -235,6 +282,7 @@ GridChoice choose_grid(const Scene& scene, double error) {
                    std::ranges::any_of(scene.cracks, [](const Crack& c) { return c.grows != Growth::none && c.advance == 0.0; })
                        ? ", or an advance to a crack that grows through rings without one"
                        : ""));
+    if (error < least_for_bands) chosen = cells_for_bands(scene, chosen);
     const Estimate& worst = worst_of(estimates, chosen);
     GridChoice choice;
     choice.cell = scene.specimen.size.minCoeff() / chosen;
