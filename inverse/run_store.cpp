@@ -40,6 +40,17 @@ std::uint64_t fingerprint(const Study& study) {
         for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time}) {
             print.add(sigma.value_or(0.0));
         }
+        if (const auto& fields = experiment.fields) {
+            print.add(fields->instants).add(fields->by_displacement ? 1.0 : 0.0);
+            for (const Vec2& place : fields->places) {
+                print.add(place.x()).add(place.y());
+            }
+            for (const std::vector<Vec2>& moved : fields->moved) {
+                for (const Vec2& point : moved) {
+                    print.add(point.x()).add(point.y());
+                }
+            }
+        }
         print.add(experiment.weight);
         for (const MachineNumber& number : machine_numbers()) {
             print.add(experiment.machine.*number.value);

@@ -2,6 +2,7 @@
 #include "forward/simulate.hpp"
 #include "inverse/field_comparison.hpp"
 #include "inverse/fit.hpp"
+#include "inverse/machine.hpp"
 #include "inverse/run_end.hpp"
 
 #include <gtest/gtest.h>
@@ -232,6 +233,41 @@ TEST(UnitFields, PicturesBeyondTheEndOfTheRunsAreLeftOut) {
     const FieldComparison comparison(test);
     EXPECT_EQ(comparison.stations().size(), 2 * test.fields->places.size());
     EXPECT_NE(comparison.remark().find("in 1 pictures"), std::string::npos) << comparison.remark();
+}
+
+// The model sees the pictures where u + compliance F + displacement_offset comes to the recorded displacement: with data of its
+// own nothing is left, and the derivatives are those of differences.
+TEST(GradientFields, PicturesByRecordedDisplacementAreSeenThroughTheMachine) {
+    constexpr double cell = 0.5e-3;
+    Experiment measured = measure(strip(cell), lattice_of_subsets(), 0.0, 1);
+    measured.noise.displacement_field = 0.01 * pixel;
+    const Record record = simulate(strip(cell));
+    const double stiffness = record.series.back().force / record.series.back().displacement;
+    measured.machine = {0.3 / stiffness, 0.5, 4e-6};
+    const Record seen = as_recorded(record, measured.machine);
+    measured.data = {};
+    for (const Instant& row : seen.series) {
+        measured.data.displacement.push_back(row.displacement);
+        measured.data.force.push_back(row.force);
+    }
+    for (double& at : measured.fields->instants) at = 1.3 * at + 4e-6;  // without the machine 0.075 and 0.15 mm
+    Study study = study_of(measured, cell);
+    study.experiments[0].scene.stop.displacement = 0.16e-3;
+    const StudyFunction function = fit_function(study, nullptr);
+    const Eigen::Vector2d truth(earlywood_modulus, latewood_modulus);
+    const Evaluation there = function(truth, 1);
+    ASSERT_TRUE(there.usable()) << there.status;
+    EXPECT_LT(there.residuals.cwiseAbs().maxCoeff(), 1e-4);
+    const Eigen::Vector2d aside(1.1 * earlywood_modulus, 0.9 * latewood_modulus);
+    const auto slopes = fit_slopes(study, aside, nullptr);
+    ASSERT_TRUE(slopes);
+    for (int j = 0; j < 2; ++j) {
+        Eigen::Vector2d step = Eigen::Vector2d::Zero();
+        step[j] = 1e-3 * aside[j];
+        const Eigen::VectorXd difference =
+            (function(aside + step, 1).residuals - function(aside - step, 1).residuals) / (2 * step[j]);
+        EXPECT_LT((slopes->col(j) - difference).norm(), 1e-4 * difference.norm());
+    }
 }
 
 TEST(UnitFields, ASubsetIsAveragedAsItsWarpIsFitted) {
