@@ -126,11 +126,11 @@ class GrowthByRows {
     // Whether the last row was reached by a jump.
     bool ends_with_jump() const { return ends_with_jump_; }
 
-    // What jumps within half a `window` of a place leave open there [m] or [s].
-    double error_near(double at, double window) const {
+    // What jumps between two places leave open there [m] or [s].
+    double error_between(double from, double to) const {
         double error = 0;
         for (std::size_t i = 0; i < jump_error_.size(); ++i) {
-            if (rows_.x()[i] <= at + 0.5 * window && rows_.x()[i + 1] >= at - 0.5 * window) {
+            if (rows_.x()[i] <= to && rows_.x()[i + 1] >= from) {
                 error = std::max(error, jump_error_[i]);
             }
         }
@@ -454,7 +454,11 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         const double early = crack.arrival(length - reach_of_length).value_or(from);
         const double late = crack.arrival(length + reach_of_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
-        const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
+        // Where noise may hide, within two sigmas, that it came to the length with a jump, that was anywhere between its rows.
+        const double first_place = crack.arrival(length - 2 * reach_of_length).value_or(from);
+        const double last_place = crack.arrival(length + 2 * reach_of_length).value_or(to);
+        const double of_jump = growth_by_rows.error_between(std::min(first_place, *arrival - 0.5 * arrival_window_),
+                                                            std::max(last_place, *arrival + 0.5 * arrival_window_));
         // Just before a jump and behind it one side says little.
         const double of_length = std::max(*arrival - early, late - *arrival) / std::sqrt(line_averages);
         const double of_data_place = abscissa_noise_ / std::sqrt(averaged);

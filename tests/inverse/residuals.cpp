@@ -115,6 +115,37 @@ TEST(UnitResiduals, AJumpWithinOneDisplacementIsNoBetterTimedByFewRows) {
     }
 }
 
+// A jump within a gap of the rows was anywhere in it: by noise the rows behind seem to come up to a length there, and to know
+// when.
+TEST(UnitResiduals, AJumpWithinAGapIsNoBetterTimedByTheRowsBehind) {
+    constexpr double noise = 0.1e-3, gap_begin = 0.34e-3, gap_end = 0.465e-3;
+    const auto length = [](double u) { return u < gap_begin + 5e-6 ? 2.5e-3 + 3 * u : 6e-3 + 0.5 * u; };
+    double worst = 0;
+    int stations = 0;
+    for (unsigned seed = 0; seed < 50; ++seed) {
+        Record record;
+        for (int i = 0; i < 61; ++i) {
+            Instant row;
+            row.displacement = 0.6e-3 * i / 60;
+            row.crack_length = length(row.displacement);
+            if (row.displacement < gap_begin || row.displacement > gap_end) record.series.push_back(row);
+        }
+        Experiment experiment = straight_experiment();
+        experiment.data = measure(record, 1, noise, seed);
+        experiment.data.force.clear();
+        experiment.noise.crack_length = noise;
+        for (const FitResidual& station : of_kind(Comparison(experiment), "arrival")) {
+            if (station.at > 3.8e-3 && station.at < 6e-3 + 0.5 * gap_begin) {  // reached by the jump
+                worst = std::max(worst, std::abs(station.measured - gap_begin - 5e-6) / station.sigma);
+                ++stations;
+            }
+        }
+    }
+    std::printf("a jump within a gap: %d arrivals of 50 draws, at most %.2f sigma off\n", stations, worst);
+    EXPECT_GT(stations, 400);
+    EXPECT_LT(worst, 3.5);
+}
+
 TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
     // Arrivals of rows with noise, about those without: about as large as their sigma says, each on its own.
     constexpr int rows = 41, draws = 400;
