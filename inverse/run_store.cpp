@@ -37,7 +37,7 @@ std::uint64_t fingerprint(const Study& study) {
         const Curves& data = experiment.data;
         print.add(data.time).add(data.displacement).add(data.force).add(data.crack_length);
         const Noise& noise = experiment.noise;
-        for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time}) {
+        for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time, noise.displacement_field}) {
             print.add(sigma.value_or(0.0));
         }
         if (const auto& fields = experiment.fields) {
