@@ -41,7 +41,9 @@ Curve::Curve(std::span<const double> x, std::span<const double> y) {
             y_.push_back(mean(begin + (end - begin) / 2, end));
         }
         rows_.resize(x_.size(), static_cast<int>(end - begin));
+        means_.resize(x_.size(), mean(begin, end));
     }
+    level_.resize(x_.size(), false);
     integrate();
 }
 
@@ -93,6 +95,16 @@ int Curve::usual_rows() const {
     return *middle;
 }
 
+void Curve::level_steps(double noise) {
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        if (is_step(i) && std::abs(y_[i + 1] - y_[i]) <= 2 * noise * std::sqrt(2 * (variance(i) - covariance_with_next(i)))) {
+            y_[i] = y_[i + 1] = means_[i];
+            level_[i] = level_[i + 1] = true;
+        }
+    }
+    integrate();
+}
+
 void Curve::count_at_most(int rows) { most_rows_ = rows; }
 
 double Curve::rows(double from, double to) const {
@@ -107,14 +119,16 @@ double Curve::rows(double from, double to) const {
 }
 
 double Curve::variance(std::size_t node) const {
-    const int rows = rows_[node];
-    return std::max(1.0, static_cast<double>(rows) / most_rows_) / ((rows + 1) / 2);  // a half of them, or the only one
+    const int rows = rows_[node], part = level_[node] ? rows : (rows + 1) / 2;  // half of them, or the only one
+    return std::max(1.0, static_cast<double>(rows) / most_rows_) / part;
 }
 
 double Curve::covariance_with_next(std::size_t node) const {
     const int rows = rows_[node];
-    const double half = (rows + 1) / 2;  // an odd one in the middle is in both
-    return is_step(node) && rows % 2 == 1 ? std::max(1.0, static_cast<double>(rows) / most_rows_) / (half * half) : 0.0;
+    if (!is_step(node) || (!level_[node] && rows % 2 == 0)) {
+        return 0.0;
+    }
+    return level_[node] ? variance(node) : variance(node) / ((rows + 1) / 2);  // an odd row in the middle is in both halves
 }
 
 double Curve::error(std::size_t node) const { return std::sqrt(variance(node)); }

@@ -33,6 +33,9 @@ class Curve {
     /// Median of how many rows stand at one place.
     int usual_rows() const;
 
+    /// A step that noise of the rows, one sigma, explains within two sigmas is none: both its nodes become the mean of its rows.
+    void level_steps(double noise);
+
     /// From here on more rows than that at one place count as that many.
     void count_at_most(int rows);
 
@@ -65,7 +68,9 @@ class Curve {
     std::vector<double> y_;
     std::vector<double> area_;                         // integral from the first node to each
     std::vector<int> rows_;                            // at each node's place; empty for a smoothed curve
-    int most_rows_ = std::numeric_limits<int>::max();  // that count at one
+    std::vector<double> means_;                        // of them
+    std::vector<bool> level_;                          // whether the node is that mean
+    int most_rows_ = std::numeric_limits<int>::max();  // that count at one place
     double after_ = 0;
 };
 

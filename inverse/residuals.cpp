@@ -103,7 +103,7 @@ class GrowthByRows {
             // Rows at one place are no rows before or after, where the crack has not jumped there.
             const double of_noise = noise * std::max(rows.error(i - 1), rows.error(i));
             const auto is_noise = [&](std::size_t k) {
-                return k > 0 && rows.is_step(k - 1) && std::abs(grown[k]) <= 2 * of_noise;
+                return k > 0 && rows.is_step(k - 1) && std::abs(grown[k]) <= clear * of_noise;
             };
             const std::size_t before = is_noise(i - 1) ? i - 2 : i - 1, after = is_noise(i + 1) ? i + 2 : i + 1;
             const double common = std::max(0.0, std::min(grown[before], grown[after]));
@@ -377,6 +377,7 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
 void Comparison::add_force_stations(const Experiment& experiment) {
     Curve& rows = forces_.emplace(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
+    rows.level_steps(noise);
     count_hold(rows);
     peak_force_ = largest(rows);
     const double from = rows.x().front(), to = rows.x().back();
@@ -407,6 +408,7 @@ void Comparison::add_force_stations(const Experiment& experiment) {
 void Comparison::add_crack_stations(const Experiment& experiment) {
     Curve& rows = lengths_.emplace(abscissa_, experiment.data.crack_length);
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
+    rows.level_steps(noise);
     count_hold(rows);
     longest_length_ = largest(rows);
     add_arrival_stations(experiment, rows, noise);

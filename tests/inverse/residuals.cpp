@@ -24,6 +24,16 @@ Record straight(double force_slope, double crack_speed, double last, int rows = 
     return record;
 }
 
+// The record with each row so many times.
+Record with_each_row(Record record, int times) {
+    std::vector<Instant> series;
+    for (const Instant& row : record.series) {
+        series.insert(series.end(), static_cast<std::size_t>(times), row);
+    }
+    record.series = series;
+    return record;
+}
+
 Experiment straight_experiment() {
     Experiment experiment;
     experiment.name = "test";
@@ -148,31 +158,34 @@ TEST(UnitResiduals, AJumpWithinAGapIsNoBetterTimedByTheRowsBehind) {
 
 TEST(UnitResiduals, SteadyGrowthOverFewRowsIsTimedByItsNoise) {
     // Arrivals of rows with noise, about those without: about as large as their sigma says, each on its own.
-    constexpr int rows = 41, draws = 400;
+    constexpr int draws = 400;
     Experiment experiment = straight_experiment();
-    const Record truth = straight(1e5, 8, 1e-3, rows);
     experiment.noise.crack_length = 0.02e-3;
-    double squares = 0, neighbours = 0, count = 0;
-    for (int draw = 0; draw < draws; ++draw) {
-        experiment.data = measure(truth, 0, 0.02e-3, static_cast<unsigned>(draw + 1));
-        const Comparison comparison(experiment);
-        const Eigen::VectorXd modelled = comparison.modelled(truth);
-        double before = 0;
-        for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
-            const FitResidual& station = comparison.stations()[i];
-            if (station.kind != "arrival" || station.measured < 0.1e-3 || station.measured > 0.9e-3)
-                continue;  // growth begins and ends there
-            const double residual = (modelled[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma;
-            squares += residual * residual;
-            neighbours += residual * before;
-            count += 1;
-            before = residual;
+    for (const int rows_at_one_place : {1, 2, 4}) {
+        const Record truth = with_each_row(straight(1e5, 8, 1e-3, 41), rows_at_one_place);
+        double squares = 0, neighbours = 0, count = 0, sigmas = 0;
+        for (int draw = 0; draw < draws; ++draw) {
+            experiment.data = measure(truth, 0, 0.02e-3, static_cast<unsigned>(draw + 1));
+            const Comparison comparison(experiment);
+            const Eigen::VectorXd modelled = comparison.modelled(truth);
+            double before = 0;
+            for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+                const FitResidual& station = comparison.stations()[i];
+                if (station.kind != "arrival" || station.measured < 0.1e-3 || station.measured > 0.9e-3)
+                    continue;  // growth begins and ends there
+                const double residual = (modelled[static_cast<Eigen::Index>(i)] - station.measured) / station.sigma;
+                squares += residual * residual;
+                neighbours += residual * before;
+                count += 1;
+                sigmas += station.sigma;
+                before = residual;
+            }
         }
+        std::printf("%d rows at one place: %.0f stations a draw, mean square %.2f, autocorrelation %.3f, mean sigma %.2g mm\n",
+                    rows_at_one_place, count / draws, squares / count, neighbours / squares, 1e3 * sigmas / count);
+        EXPECT_NEAR(squares / count, 1, 0.15);
+        EXPECT_NEAR(neighbours / squares, 0, 0.1);
     }
-    std::printf("%.0f stations a draw, mean square %.2f, autocorrelation %.3f\n", count / draws, squares / count,
-                neighbours / squares);
-    EXPECT_NEAR(squares / count, 1, 0.15);
-    EXPECT_NEAR(neighbours / squares, 0, 0.1);
 }
 
 TEST(UnitResiduals, StationsInOneJumpCountTogetherAsOne) {
@@ -475,14 +488,8 @@ TEST(UnitResiduals, ACrackThatStandsIsComparedByItsLength) {
 
 // 41 displacements with so many rows each, the force with noise of 2 N, the crack, which stands, of 0.2 mm.
 Experiment with_rows_at_one_place(int rows, unsigned seed) {
-    Record record = straight(1e5, 0, 1e-3, 41);
-    std::vector<Instant> series;
-    for (const Instant& row : record.series) {
-        series.insert(series.end(), static_cast<std::size_t>(rows), row);
-    }
-    record.series = series;
     Experiment experiment = straight_experiment();
-    experiment.data = measure(record, 2.0, 0.2e-3, seed);
+    experiment.data = measure(with_each_row(straight(1e5, 0, 1e-3, 41), rows), 2.0, 0.2e-3, seed);
     return experiment;
 }
 
@@ -507,12 +514,11 @@ TEST(UnitResiduals, EachRowAtOneDisplacementCounts) {
         for (const bool force : {false, true}) {
             EXPECT_NEAR(squares[force] / stations[force], 1, 4 * std::sqrt(2 / stations[force])) << rows;
         }
-        const double exact = rows == 3 ? 41 / 0.375 : 41.0 * rows;  // of three, the one in the middle is in both halves
-        EXPECT_NEAR(information / exact, 1, 1e-9) << rows;
+        EXPECT_NEAR(information / (41 * rows), 1, 0.1) << rows;  // less at steps that noise has made in one of 20 places
         Experiment estimated = with_rows_at_one_place(rows, 7);
         estimated.noise.force.reset();
         const double sigma = of_kind(Comparison(estimated), "force")[20].sigma;  // of 41: the median is good to some 24 %
-        EXPECT_NEAR(sigma * std::sqrt(exact / 41), 2.0, 0.75) << rows;
+        EXPECT_NEAR(sigma * std::sqrt(rows), 2.0, 0.75) << rows;
     }
 }
 
