@@ -424,7 +424,7 @@ TEST(SystemFit, APriorAgainstTheDataIsNoErrorOfTheModel) {
     for (const char* method : {"auto", "bobyqa"}) {
         Study study = bar.study();
         study.optimizer.method = method;
-        study.uncertainty = {.profile = true, .posterior = 4000};
+        study.uncertainty = {.profile = true, .posterior = 1500};
         study.parameters[0].prior = Prior{(bar.least_squares + 10 * error) * 1e6, 0.5 * error * 1e6};
         FitOptions options;
         options.threads = 1;
@@ -437,10 +437,10 @@ TEST(SystemFit, APriorAgainstTheDataIsNoErrorOfTheModel) {
         EXPECT_LT(E.upper_95, E.value + 20 * E.standard_error) << method;
         double mean = 0, squares = 0;
         for (const PosteriorSample& sample : fit.posterior) {
-            mean += sample.parameters[0] / 4000;
-            squares += std::pow(sample.parameters[0], 2) / 4000;
+            mean += sample.parameters[0] / 1500;
+            squares += std::pow(sample.parameters[0], 2) / 1500;
         }
-        // The weights are 1 of the data and 4 of the prior; some 500 of the samples are independent.
+        // The weights are 1 of the data and 4 of the prior; some 200 of the samples are independent.
         EXPECT_NEAR((mean - bar.least_squares) / error, 8, 0.1) << method;
         EXPECT_NEAR(std::sqrt(squares - mean * mean) / error, 1 / std::sqrt(5.0), 0.05) << method;
     }
