@@ -11,6 +11,7 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 namespace crampfit::cli {
@@ -72,26 +73,30 @@ bool asks_for(const DakotaRequest& request, DakotaRequest::Active what) {
 
 /// Why there is nothing to write; empty: it was written.
 std::string evaluate(const Study& study, const DakotaRequest& request, const Point& point, const CommonOptions& common,
-                     const std::filesystem::path& results) {
+                     const std::filesystem::path& parameters, const std::filesystem::path& results) {
     const bool of_outputs = !study.outputs.empty();
     if (asks_for(request, DakotaRequest::hessian)) return "Hessians were asked for, and there are none";
     const bool misfit = !of_outputs && request.active.size() == 1;
-    const std::size_t count = of_outputs ? output_count(study) : residual_count(study);
+    const std::vector<std::string> names = of_outputs ? output_names(study) : std::vector<std::string>{};
+    const std::size_t count = of_outputs ? names.size() : residual_count(study);
     if (!misfit && count != request.active.size())
         throw InputError(study.file.string(), of_outputs ? "outputs" : "residuals", std::to_string(count),
                          fmt::format("must be as many as the functions that are asked for, which are {}{}", request.active.size(),
                                      of_outputs ? "" : "; or ask for one, the sum of their squares"));
+    std::vector<std::size_t> order(request.active.size());  // of the study's outputs or residuals, as functions are
+    std::iota(order.begin(), order.end(), 0);
+    if (of_outputs) order = outputs_asked_for(request, names, parameters);
     const StudyFunction function =
         of_outputs ? output_function(study, &stop_requested()) : fit_function(study, &stop_requested());
     const Evaluation evaluation = function(point.values, common.threads);
     if (!evaluation.usable()) return evaluation.status;
-    Eigen::VectorXd values = evaluation.residuals;
+    Eigen::VectorXd values = misfit ? evaluation.residuals : Eigen::VectorXd(evaluation.residuals(order));
     Eigen::MatrixXd slopes;  // [functions x parameters]
     if (asks_for(request, DakotaRequest::gradient)) {
         const auto found = of_outputs ? output_slopes(study, point.values, &stop_requested())
                                       : fit_slopes(study, point.values, &stop_requested());
         if (!found) return "gradients were asked for, and the solver has none that hold for this study: see crampfit explain";
-        slopes = misfit ? Eigen::MatrixXd(2.0 * values.transpose() * *found) : *found;
+        slopes = misfit ? Eigen::MatrixXd(2.0 * values.transpose() * *found) : Eigen::MatrixXd((*found)(order, Eigen::all));
     }
     if (misfit) values = Eigen::VectorXd::Constant(1, evaluation.misfit);
     for (std::size_t k = 0; k < request.active.size(); ++k) {
@@ -118,7 +123,8 @@ ExitStatus evaluate_and_save(const EvaluateArguments& arguments, const CommonOpt
     std::string failure;
     try {
         const DakotaRequest request = read_dakota_request(arguments.parameters);
-        failure = evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.results);
+        failure = evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.parameters,
+                           arguments.results);
     } catch (const InputError& error) {  // no answer to an earlier question stays
         write_dakota_failure(error.what(), arguments.results);
         throw;

@@ -1,6 +1,7 @@
 #include "datasets/dakota.hpp"
 
 #include "datasets/error.hpp"
+#include "datasets/keys.hpp"
 #include "datasets/text_file.hpp"
 #include "datasets/units.hpp"
 #include "datasets/whole_file.hpp"
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <numeric>
 #include <sstream>
 
 namespace crampfit {
@@ -140,6 +142,39 @@ DakotaRequest read_dakota_request(const std::filesystem::path& file) {
         throw InputError(reader.file(), metadata.front().tag, metadata.front().value, "there is no metadata to give");
     }
     return request;
+}
+
+std::vector<std::size_t> outputs_asked_for(const DakotaRequest& request, const std::vector<std::string>& names,
+                                           const std::filesystem::path& file) {
+    std::vector<std::string> known = names;
+    for (std::string& name : known) {
+        std::ranges::replace(name, ' ', '_');
+    }
+    const auto number_of = [&](const std::string& label) {
+        return static_cast<std::size_t>(std::ranges::find(known, label) - known.begin());
+    };
+    std::vector<std::size_t> order(request.labels.size());
+    std::iota(order.begin(), order.end(), 0);
+    const bool by_name = std::ranges::any_of(request.labels, [&](const auto& l) { return number_of(l) < known.size(); });
+    std::vector<bool> taken(known.size(), false);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        const std::string& label = request.labels[k];
+        const std::string key = fmt::format("ASV_{}", k + 1);
+        if (by_name) {
+            order[k] = number_of(label);
+            if (order[k] < known.size() && taken[order[k]]) {
+                throw InputError(file.string(), key, label, "is the same output as another function");
+            }
+        }
+        if (by_name ? order[k] == known.size() : !label.empty() && !label.ends_with(std::to_string(k + 1))) {
+            throw InputError(file.string(), key, label,
+                             fmt::format("is no output of the study: name it as the study does, with _ for each space, or number "
+                                         "all functions in the study's order, as f1, f2{}",
+                                         suggestion(label, known)));
+        }
+        taken[order[k]] = true;
+    }
+    return order;
 }
 
 void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values,

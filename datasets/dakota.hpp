@@ -22,6 +22,12 @@ struct DakotaRequest {
 /// Throws InputError for a file that is neither, and for metadata, of which there is none to give.
 DakotaRequest read_dakota_request(const std::filesystem::path& file);
 
+/// Which of the outputs with these names each function is [functions]: by its label, in which _ stands for a space, each once; or
+/// one after the other where labels are left out or end with their own number, as f1 and Dakota's response_fn_1. Throws
+/// InputError for other labels; there must be as many functions as names.
+std::vector<std::size_t> outputs_asked_for(const DakotaRequest& request, const std::vector<std::string>& names,
+                                           const std::filesystem::path& file);
+
 /// What was asked for: values [functions], gradients [functions][derivative variables]. Written as a whole.
 void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values,
                           const std::vector<std::vector<double>>& gradients, const std::filesystem::path& file);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace crampfit {
 
@@ -13,7 +14,11 @@ Placement read_placement(const Entry& entry, const std::optional<double>& pixel,
     Placement placement;
     placement.rows = rows;
     if (const auto given = find("pixel")) {
+        constexpr double written = 1e-6;  // part of it that the digits leave open
         placement.pixel = given->number(limits::pixel);
+        if (pixel && std::abs(placement.pixel - *pixel) > written * *pixel) {
+            given->fail(fmt::format("contradicts the file, whose pixel is {:g} um: leave one of them out", 1e6 * *pixel));
+        }
     } else if (pixel) {
         placement.pixel = *pixel;
     } else {

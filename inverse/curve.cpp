@@ -40,7 +40,10 @@ Curve::Curve(std::span<const double> x, std::span<const double> y) {
             x_.push_back(std::nextafter(x_.back(), INFINITY));
             y_.push_back(mean(begin + (end - begin) / 2, end));
         }
+        rows_.resize(x_.size(), static_cast<int>(end - begin));
+        means_.resize(x_.size(), mean(begin, end));
     }
+    level_.resize(x_.size(), false);
     integrate();
 }
 
@@ -78,38 +81,117 @@ double Curve::mean(double from, double to) const {
     return to - from > narrow * (x_.back() - x_.front()) ? (area(to) - area(from)) / (to - from) : 0.5 * (at(from) + at(to));
 }
 
-int Curve::count(double from, double to) const {
-    return static_cast<int>(std::lower_bound(x_.begin(), x_.end(), to) - std::lower_bound(x_.begin(), x_.end(), from));
+bool Curve::is_step(std::size_t node) const { return node + 1 < x_.size() && x_[node + 1] == std::nextafter(x_[node], INFINITY); }
+
+int Curve::usual_rows() const {
+    std::vector<int> places;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        if (!is_step(i)) {
+            places.push_back(rows_[i]);
+        }
+    }
+    const auto middle = places.begin() + static_cast<std::ptrdiff_t>(places.size() / 2);
+    std::nth_element(places.begin(), middle, places.end());
+    return *middle;
+}
+
+void Curve::level_steps(double noise) {
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        if (is_step(i) && std::abs(y_[i + 1] - y_[i]) <= 2 * noise * std::sqrt(2 * (variance(i) - covariance_with_next(i)))) {
+            y_[i] = y_[i + 1] = means_[i];
+            level_[i] = level_[i + 1] = true;
+        }
+    }
+    integrate();
+}
+
+void Curve::count_at_most(int rows) { most_rows_ = rows; }
+
+double Curve::rows(double from, double to) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        if (x_[i] >= from && x_[i] < to) {
+            const double there = std::min(rows_[i], most_rows_);
+            sum += rows_[i] > 1 ? 0.5 * there : 1.0;
+        }
+    }
+    return sum;
+}
+
+double Curve::variance(std::size_t node) const {
+    const int rows = rows_[node], part = level_[node] ? rows : (rows + 1) / 2;  // half of them, or the only one
+    return std::max(1.0, static_cast<double>(rows) / most_rows_) / part;
+}
+
+double Curve::covariance_with_next(std::size_t node) const {
+    const int rows = rows_[node];
+    if (!is_step(node) || (!level_[node] && rows % 2 == 0)) {
+        return 0.0;
+    }
+    return level_[node] ? variance(node) : variance(node) / ((rows + 1) / 2);  // an odd row in the middle is in both halves
+}
+
+double Curve::error(std::size_t node) const { return std::sqrt(variance(node)); }
+
+double Curve::usual_error() const {
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        errors.push_back(error(i));
+    }
+    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+    std::nth_element(errors.begin(), middle, errors.end());
+    return *middle;
+}
+
+double Curve::off_line(std::size_t node) const {
+    const std::size_t i = node;
+    const double s = (x_[i] - x_[i - 1]) / (x_[i + 1] - x_[i - 1]);
+    const double off = y_[i] - std::lerp(y_[i - 1], y_[i + 1], s);
+    const double squares = variance(i) + (1 - s) * (1 - s) * variance(i - 1) + s * s * variance(i + 1) -
+                           2 * (1 - s) * covariance_with_next(i - 1) - 2 * s * covariance_with_next(i);
+    return off / std::sqrt(squares);
+}
+
+std::vector<double> Curve::weights_of_mean(double from, double to) const {
+    std::vector<double> weights(x_.size(), 0.0);
+    if (!(to - from > narrow * (x_.back() - x_.front()))) {
+        for (const double end : {from, to}) {
+            const double x = std::clamp(end, x_.front(), x_.back());
+            const auto above = static_cast<std::size_t>(std::lower_bound(x_.begin(), x_.end(), x) - x_.begin());
+            const double s = above > 0 ? (x - x_[above - 1]) / (x_[above] - x_[above - 1]) : 1.0;
+            weights[above] += 0.5 * s;
+            if (above > 0) {
+                weights[above - 1] += 0.5 * (1 - s);
+            }
+        }
+        return weights;
+    }
+    weights.front() = std::max(0.0, std::min(to, x_.front()) - from);
+    weights.back() += std::max(0.0, to - std::max(from, x_.back()));
+    for (std::size_t i = 0; i + 1 < x_.size(); ++i) {
+        const double low = std::max(from, x_[i]), high = std::min(to, x_[i + 1]);
+        if (low < high) {
+            const double part = (0.5 * (low + high) - x_[i]) / (x_[i + 1] - x_[i]);  // of the next node, in the mean
+            weights[i] += (1 - part) * (high - low);
+            weights[i + 1] += part * (high - low);
+        }
+    }
+    for (double& weight : weights) {
+        weight /= to - from;
+    }
+    return weights;
 }
 
 double Curve::error_of_mean(double from, double to) const {
-    if (!(to - from > narrow * (x_.back() - x_.front()))) {
-        const double at = std::clamp(0.5 * (from + to), x_.front(), x_.back());
-        const auto above = std::max<std::ptrdiff_t>(1, std::lower_bound(x_.begin(), x_.end(), at) - x_.begin());
-        if (x_.size() == 1) {
-            return 1;
+    const std::vector<double> weights = weights_of_mean(from, to);
+    double squares = 0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+        squares += weights[i] * weights[i] * variance(i);
+        if (is_step(i)) {
+            squares += 2 * weights[i] * weights[i + 1] * covariance_with_next(i);
         }
-        const auto i = static_cast<std::size_t>(above);
-        const double s = (at - x_[i - 1]) / (x_[i] - x_[i - 1]);
-        return std::hypot(1 - s, s);
     }
-    double squares = 0, weight = std::max(0.0, std::min(to, x_.front()) - from);  // of the node at hand: what lies to its left
-    for (std::size_t i = 0; i < x_.size(); ++i) {
-        double next = 0;
-        if (i + 1 < x_.size()) {
-            const double low = std::max(from, x_[i]), high = std::min(to, x_[i + 1]);
-            if (low < high) {
-                const double part = (0.5 * (low + high) - x_[i]) / (x_[i + 1] - x_[i]);  // of the next node, in the mean
-                weight += (1 - part) * (high - low);
-                next = part * (high - low);
-            }
-        } else {
-            weight += std::max(0.0, to - std::max(from, x_.back()));
-        }
-        squares += weight * weight;
-        weight = next;
-    }
-    return std::sqrt(squares) / (to - from);
+    return std::sqrt(squares);
 }
 
 double Curve::widest_step(double from, double to) const {
@@ -139,6 +221,7 @@ Curve Curve::smoothed(double window) const {
         const double half = std::min({0.5 * window, x - x_.front(), x_.back() - x});
         result.y_.push_back(half > least ? mean(x - half, x + half) : at(x));
     }
+    result.rows_.clear();
     result.integrate();
     return result;
 }

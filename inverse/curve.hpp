@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -19,10 +21,26 @@ class Curve {
 
     double at(double x) const;                  // the first value continues to the left
     double mean(double from, double to) const;  // average over an interval; of no width: the value there
-    int count(double from, double to) const;    // nodes in [from, to)
 
-    /// Standard deviation of that average where each node has an error of its own, of one.
-    double error_of_mean(double from, double to) const;
+    // Of a curve that was not smoothed, where each row has an error of its own, with a standard deviation of one:
+    double rows(double from, double to) const;           // that its nodes in [from, to) are the mean of
+    double error(std::size_t node) const;                // standard deviation of a node's value
+    double usual_error() const;                          // their median
+    double error_of_mean(double from, double to) const;  // standard deviation of the average
+    double
+    off_line(std::size_t node) const;  // how far it lies off the line between its neighbours, in standard deviations of that
+
+    /// Median of how many rows stand at one place.
+    int usual_rows() const;
+
+    /// A step that noise of the rows, one sigma, explains within two sigmas is none: both its nodes become the mean of its rows.
+    void level_steps(double noise);
+
+    /// From here on more rows than that at one place count as that many.
+    void count_at_most(int rows);
+
+    /// Whether a node and the next stand at one place.
+    bool is_step(std::size_t node) const;
 
     /// The widest step from node to node that lies at least partly within an interval; 0 where there is none.
     double widest_step(double from, double to) const;
@@ -42,10 +60,17 @@ class Curve {
   private:
     double area(double x) const;  // integral from the first node
     void integrate();
+    double variance(std::size_t node) const;                            // where each row has one of one
+    double covariance_with_next(std::size_t node) const;                // the same, of a step
+    std::vector<double> weights_of_mean(double from, double to) const;  // [nodes]
 
     std::vector<double> x_;  // strictly rising
     std::vector<double> y_;
-    std::vector<double> area_;  // integral from the first node to each
+    std::vector<double> area_;                         // integral from the first node to each
+    std::vector<int> rows_;                            // at each node's place; empty for a smoothed curve
+    std::vector<double> means_;                        // of them
+    std::vector<bool> level_;                          // whether the node is that mean
+    int most_rows_ = std::numeric_limits<int>::max();  // that count at one place
     double after_ = 0;
 };
 

@@ -28,7 +28,7 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
     places_ = fields.places;
     reach_ = fields.subset * std::numbers::sqrt2 / 2;
     camera_moves_ = fields.camera_moves;
-    std::size_t followed = 0;
+    std::size_t followed = 0, compared = 0;
     for (std::size_t k = 0; k < fields.instants.size(); ++k) {
         std::vector<Point>& points = pictures_.emplace_back();
         for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -45,6 +45,7 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
             points.clear();
         }
         followed += points.size();
+        compared += !points.empty();
     }
     for (int axis = 0; axis < 2; ++axis) {
         for (std::size_t k = 0; k < pictures_.size(); ++k) {
@@ -57,7 +58,7 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
         }
     }
     remark_ = fmt::format("{}: displacements of {} points in {} pictures are compared, {} with no pixel in common{}.",
-                          experiment.name, followed, fields.instants.size(), places_.size(),
+                          experiment.name, followed, compared, places_.size(),
                           camera_moves_ ? "; each picture may have moved and turned as a whole" : "");
 }
 

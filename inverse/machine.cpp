@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace crampfit {
@@ -53,6 +54,26 @@ Record as_recorded(const Record& record, const Machine& machine) {
         result.series.push_back(before);
     }
     return result;
+}
+
+std::vector<double> displacements_of_run(const Record& record, const Machine& machine, const std::vector<double>& recorded) {
+    const auto seen = [&](const Instant& row) {
+        return row.displacement + machine.compliance * row.force + machine.displacement_offset;
+    };
+    std::vector<double> displacements;
+    for (const double at : recorded) {
+        const auto after = std::ranges::find_if(record.series, [&](const Instant& row) { return seen(row) >= at; });
+        if (after == record.series.end()) {
+            displacements.push_back(std::numeric_limits<double>::infinity());
+        } else if (after == record.series.begin()) {
+            displacements.push_back(after->displacement);
+        } else {
+            const Instant& before = *std::prev(after);
+            const double share = (at - seen(before)) / (seen(*after) - seen(before));
+            displacements.push_back(std::lerp(before.displacement, after->displacement, share));
+        }
+    }
+    return displacements;
 }
 
 }  // namespace crampfit

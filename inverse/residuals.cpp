@@ -61,29 +61,20 @@ void check_rises(const Experiment& experiment, const std::vector<double>& abscis
     }
 }
 
-// Standard deviation of the rows about the line between their neighbours, robust against jumps: for white noise the
-// median of |d| is sigma sqrt(1 + s^2 + (1-s)^2) / 1.4826, with s the place between the neighbours.
-double scatter(const Curve& rows) {
-    const auto& x = rows.x();
-    const auto& y = rows.y();
-    std::vector<double> deviations;
-    for (std::size_t i = 1; i + 1 < x.size(); ++i) {
-        const double s = (x[i] - x[i - 1]) / (x[i + 1] - x[i - 1]);
-        const double deviation = std::abs(y[i] - std::lerp(y[i - 1], y[i + 1], s));
-        deviations.push_back(deviation / std::sqrt(1 + s * s + (1 - s) * (1 - s)));
-    }
-    if (deviations.empty()) {
-        return 0;
-    }
-    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-    std::nth_element(deviations.begin(), middle, deviations.end());
-    return 1.4826 * *middle;
-}
-
 double median(std::vector<double> values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
+}
+
+// Standard deviation of the rows about the line between their neighbours, robust against jumps: for white noise the median of
+// what a node lies off it, in standard deviations of that, is sigma / 1.4826.
+double scatter(const Curve& rows) {
+    std::vector<double> deviations;
+    for (std::size_t i = 1; i + 1 < rows.x().size(); ++i) {
+        deviations.push_back(std::abs(rows.off_line(i)));
+    }
+    return deviations.empty() ? 0.0 : 1.4826 * median(std::move(deviations));
 }
 
 // Median of what a curve goes from row to row.
@@ -109,13 +100,19 @@ class GrowthByRows {
         std::vector<double> steady{0.0};
         for (std::size_t i = 1; i + 1 < grown.size(); ++i) {
             // What is beyond twice the growth of the rows before and after; growth begins and ends between rows as jumps do.
-            const double common = std::max(0.0, std::min(grown[i - 1], grown[i + 1]));
-            const double jumped = grown[i] > clear * noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
+            // Rows at one place are no rows before or after, where the crack has not jumped there.
+            const double of_noise = noise * std::max(rows.error(i - 1), rows.error(i));
+            const auto is_noise = [&](std::size_t k) {
+                return k > 0 && rows.is_step(k - 1) && std::abs(grown[k]) <= clear * of_noise;
+            };
+            const std::size_t before = is_noise(i - 1) ? i - 2 : i - 1, after = is_noise(i + 1) ? i + 2 : i + 1;
+            const double common = std::max(0.0, std::min(grown[before], grown[after]));
+            const double jumped = grown[i] > clear * of_noise ? std::max(0.0, 1 - 2 * common / grown[i]) : 0.0;
             const double apart = rows.x()[i] - rows.x()[i - 1];
             // With less growth the line to the rows beside it tells.
-            const bool at_one_place = apart <= one_place * window && grown[i] > 2 * noise;
-            jump_error_.push_back(at_one_place ? window * noise / grown[i] : jumped * apart);
-            if (jumped < 0.5 && grown[i] > 0) {
+            const bool at_one_place = apart <= one_place * window && grown[i] > 2 * of_noise;
+            jump_error_.push_back(at_one_place ? window * of_noise / grown[i] : jumped * apart);
+            if (jumped < 0.5 && grown[i] > 0 && !is_noise(i)) {
                 steady.push_back(grown[i]);
             }
             ends_with_jump_ = jumped >= 0.5;
@@ -129,11 +126,11 @@ class GrowthByRows {
     // Whether the last row was reached by a jump.
     bool ends_with_jump() const { return ends_with_jump_; }
 
-    // What jumps within half a `window` of a place leave open there [m] or [s].
-    double error_near(double at, double window) const {
+    // What jumps between two places leave open there [m] or [s].
+    double error_between(double from, double to) const {
         double error = 0;
         for (std::size_t i = 0; i < jump_error_.size(); ++i) {
-            if (rows_.x()[i] <= at + 0.5 * window && rows_.x()[i + 1] >= at - 0.5 * window) {
+            if (rows_.x()[i] <= to && rows_.x()[i + 1] >= from) {
                 error = std::max(error, jump_error_[i]);
             }
         }
@@ -146,6 +143,14 @@ class GrowthByRows {
     double steady_step_ = 0;
     bool ends_with_jump_ = false;
 };
+
+// Of how many rows the nodes on both sides of a place are the mean, at the least.
+double rows_beside(const Curve& rows, double place) {
+    const std::vector<double>& x = rows.x();
+    const auto above = std::clamp<std::ptrdiff_t>(std::lower_bound(x.begin(), x.end(), place) - x.begin(), 1, std::ssize(x) - 1);
+    const auto node = static_cast<std::size_t>(above);
+    return 1 / std::pow(std::max(rows.error(node - 1), rows.error(node)), 2);
+}
 
 // The curve that keeps its last value up to a place beyond it.
 Curve continued(std::vector<double> x, std::vector<double> y, double to) {
@@ -197,6 +202,19 @@ double sampling_error(const Curve& rows, double from, double to, const std::func
 
 using Intervals = std::vector<std::pair<double, double>>;  // from, to
 
+// From the first to the last node of each place.
+Intervals places_of(const Curve& rows) {
+    Intervals places;
+    for (std::size_t i = 0; i < rows.x().size(); ++i) {
+        if (i > 0 && rows.is_step(i - 1)) {
+            places.back().second = rows.x()[i];
+        } else {
+            places.emplace_back(rows.x()[i], rows.x()[i]);
+        }
+    }
+    return places;
+}
+
 // Over which intervals the rows of a tile are averaged: over all of it where rows are close, next to a window; else from first to
 // last row of those that lie no farther apart than half of one, at the least a single row. A line across a gap is nobody's
 // measurement, and a row's share in the tiles on both sides of it would let their errors go together.
@@ -206,14 +224,14 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
         return {{from, to}};
     }
     Intervals groups;
-    for (const double x : rows.x()) {
-        if (x < from || x > to || (x == to && to < rows.x().back())) {
+    for (const auto& [first, last] : places_of(rows)) {
+        if (first < from || first > to || (first == to && to < rows.x().back())) {
             continue;  // it belongs to the next tile
         }
-        if (!groups.empty() && x - groups.back().second <= together * window) {
-            groups.back().second = x;
+        if (!groups.empty() && first - groups.back().second <= together * window) {
+            groups.back().second = last;
         } else {
-            groups.emplace_back(x, x);
+            groups.emplace_back(first, last);
         }
     }
     return groups;
@@ -284,7 +302,8 @@ void Comparison::add_curves(const Experiment& experiment) {
     abscissa_ = by_time_ ? data.time : data.displacement;
     const auto& materials = experiment.scene.materials;
     const bool remembers = std::ranges::any_of(materials, [](const auto& material) { return material.second.remembers(); });
-    if (!by_time_ && measured(data.time) && remembers) {
+    may_relax_ = !by_time_ && remembers;
+    if (may_relax_ && measured(data.time)) {
         tell_of_hold(experiment);
     }
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
@@ -301,7 +320,7 @@ void Comparison::add_curves(const Experiment& experiment) {
     }
 }
 
-// Rows at one displacement count as one there, whatever the wood does meanwhile.
+// Rows at one displacement count as few there, whatever the wood does meanwhile.
 void Comparison::tell_of_hold(const Experiment& experiment) {
     constexpr double plain = 0.25;  // of the rows
     std::vector<double> places = abscissa_;
@@ -322,9 +341,16 @@ void Comparison::tell_of_hold(const Experiment& experiment) {
     }
     if (static_cast<double>(most) > plain * static_cast<double>(places.size())) {
         remarks_.push_back(
-            fmt::format("{}: {} of {} rows stand at {:.3g} mm and count as one there; of wood that remembers they tell "
-                        "more by time: leave displacement out.",
+            fmt::format("{}: {} of {} rows stand at {:.3g} mm and count as those of another place do; of wood that remembers "
+                        "they tell more by time: leave displacement out.",
                         experiment.name, most, places.size(), 1e3 * where));
+    }
+}
+
+// Rows of a hold count as those of another place do.
+void Comparison::count_hold(Curve& rows) const {
+    if (may_relax_) {
+        rows.count_at_most(rows.usual_rows());
     }
 }
 
@@ -349,12 +375,14 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
 }
 
 void Comparison::add_force_stations(const Experiment& experiment) {
-    const Curve& rows = forces_.emplace(abscissa_, experiment.data.force);
+    Curve& rows = forces_.emplace(abscissa_, experiment.data.force);
     const double noise = noise_of(experiment, "force", rows, experiment.noise.force);
+    rows.level_steps(noise);
+    count_hold(rows);
     peak_force_ = largest(rows);
     const double from = rows.x().front(), to = rows.x().back();
     const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
-    const double usual = std::max(noise, usual_step(rows));
+    const double usual = std::max(noise * rows.usual_error(), usual_step(rows));
     const auto fall = [usual](double before, double after) {
         const double by = std::abs(before) - std::abs(after);
         return by > clear * usual ? by : 0.0;
@@ -378,8 +406,10 @@ void Comparison::add_force_stations(const Experiment& experiment) {
 }
 
 void Comparison::add_crack_stations(const Experiment& experiment) {
-    const Curve& rows = lengths_.emplace(abscissa_, experiment.data.crack_length);
+    Curve& rows = lengths_.emplace(abscissa_, experiment.data.crack_length);
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
+    rows.level_steps(noise);
+    count_hold(rows);
     longest_length_ = largest(rows);
     add_arrival_stations(experiment, rows, noise);
     add_length_stations(experiment, rows, noise);
@@ -420,13 +450,17 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         if (!arrival) {
             continue;
         }
-        const double averaged =
-            std::max(line_averages, 0.5 + rows.count(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
+        const double averaged = std::max(line_averages * rows_beside(rows, *arrival),
+                                         0.5 + rows.rows(*arrival - 0.5 * arrival_window_, *arrival + 0.5 * arrival_window_));
         const double reach_of_length = noise * std::sqrt(line_averages / averaged);
         const double early = crack.arrival(length - reach_of_length).value_or(from);
         const double late = crack.arrival(length + reach_of_length).value_or(to);
         FitResidual station{.experiment = experiment.name, .kind = "arrival", .at = length, .measured = *arrival};
-        const double of_jump = growth_by_rows.error_near(*arrival, arrival_window_);
+        // Where noise may hide, within two sigmas, that it came to the length with a jump, that was anywhere between its rows.
+        const double first_place = crack.arrival(length - 2 * reach_of_length).value_or(from);
+        const double last_place = crack.arrival(length + 2 * reach_of_length).value_or(to);
+        const double of_jump = growth_by_rows.error_between(std::min(first_place, *arrival - 0.5 * arrival_window_),
+                                                            std::max(last_place, *arrival + 0.5 * arrival_window_));
         // Just before a jump and behind it one side says little.
         const double of_length = std::max(*arrival - early, late - *arrival) / std::sqrt(line_averages);
         const double of_data_place = abscissa_noise_ / std::sqrt(averaged);
@@ -454,8 +488,7 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
         }
     }
     std::sort(arrivals.begin(), arrivals.end());
-    const std::vector<double>& x = rows.x();
-    const double first = x.front(), last = x.back();
+    const double first = rows.x().front(), last = rows.x().back();
     if (arrival_window_ > 0) {
         double from = first;
         const auto tile_up_to = [&](double to) {
@@ -472,14 +505,16 @@ void Comparison::add_length_stations(const Experiment& experiment, const Curve& 
         }
         tile_up_to(last);
     } else {
-        for (std::size_t i = 0; i < x.size(); ++i) {  // an arrival is taken from the rows on both sides of it
-            const double before = x[i > 0 ? i - 1 : 0], after = x[std::min(i + 1, x.size() - 1)];
+        const Intervals places = places_of(rows);
+        for (std::size_t i = 0; i < places.size(); ++i) {  // an arrival is taken from the rows on both sides of it
+            const double before = places[i > 0 ? i - 1 : 0].first, after = places[std::min(i + 1, places.size() - 1)].second;
             if (std::none_of(arrivals.begin(), arrivals.end(), [&](double a) { return a >= before && a <= after; })) {
-                length_tiles_.emplace_back(x[i], x[i]);
+                length_tiles_.push_back(places[i]);
             }
         }
     }
-    const auto jump = [&](double before, double after) { return after - before > clear * noise ? after - before : 0.0; };
+    const double usual = noise * rows.usual_error();
+    const auto jump = [&](double before, double after) { return after - before > clear * usual ? after - before : 0.0; };
     for (const auto& [from, to] : length_tiles_) {
         const double at = std::midpoint(from, to), half = 0.5 * (to - from);
         const double averaging = rows.error_of_mean(from, to);

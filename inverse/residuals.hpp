@@ -21,9 +21,11 @@ namespace crampfit {
 /// curves get the same moving-window average, `smoothing_window` of the measured range wide, and the stations stand one
 /// window apart: the windows tile the range, every row counts once, and the stations' errors are independent. Where rows are
 /// fewer than four a window, those of a window that are no farther apart than half of it are averaged from the first to the last
-/// of them, and rows farther apart are stations themselves: no line across a gap counts. Latewood bands that the crack crosses
-/// one by one leave peaks some tenth of the range apart, which a fiftieth keeps. Where the force falls from one row to the next,
-/// as the crack jumps, when it did so is known to the rows' distance only, which counts as an error of its own.
+/// of them, and rows farther apart are stations themselves: no line across a gap counts. Rows at one displacement are averaged,
+/// and each counts; where the wood remembers, those of a hold count no more than those of a usual displacement. Latewood bands
+/// that the crack crosses one by one leave peaks some tenth of the range apart, which a fiftieth keeps. Where the force falls
+/// from one row to the next, as the crack jumps, when it did so is known to the rows' distance only, which counts as an error of
+/// its own.
 ///
 /// Arrival: the displacement (or time) at which the crack comes up to lengths spread over the measured growth, no closer
 /// than it grows from row to row. What the crack length's noise sigma_a makes of the arrival is sigma_a / (da/du), the
@@ -77,6 +79,7 @@ class Comparison {
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
     void tell_of_hold(const Experiment& experiment);
+    void count_hold(Curve& rows) const;
     double sigma(std::size_t station, double model_resolution) const;
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);
 
@@ -89,6 +92,7 @@ class Comparison {
 
     std::optional<double> longest_;  // crack, that ends runs [m]
     bool by_time_ = false;           // stations stand on time [s] instead of displacement [m]
+    bool may_relax_ = false;         // forces while displacement stands
     std::vector<double> abscissa_;   // measured displacement [m] or time [s], a row
     double abscissa_noise_ = 0;      // one sigma [m] or [s]
     double arrival_window_ = 0;      // of the average of crack length [m] or [s]

@@ -3,6 +3,7 @@
 #include "datasets/error.hpp"
 #include "datasets/machine.hpp"
 #include "forward/loading.hpp"
+#include "inverse/curve.hpp"
 
 #include <fmt/format.h>
 
@@ -96,11 +97,11 @@ std::string file_of(const Experiment& test) {
 }
 
 // A crack that has come to where each run ends is that long from there on, in data and runs alike; of forces from there on no run
-// has anything to say.
-void cut_at_crack_length(const Experiment& test, const std::vector<double>& abscissa, bool by_time, CoveredData& covered) {
+// has anything to say. Returns from where on, infinite where it does not come there.
+double cut_at_crack_length(const Experiment& test, const std::vector<double>& abscissa, bool by_time, CoveredData& covered) {
     Curves& data = covered.curves;
     if (!test.scene.stop.crack_length || !is_measured(data.crack_length)) {
-        return;
+        return unbounded;
     }
     const double longest = *test.scene.stop.crack_length;
     std::vector<std::pair<double, double>> rows;  // abscissa, crack length
@@ -112,7 +113,7 @@ void cut_at_crack_length(const Experiment& test, const std::vector<double>& absc
         }
     }
     if (most <= longest + clearly * test.noise.crack_length.value_or(0.0)) {
-        return;
+        return unbounded;
     }
     // It has come there at the row with the fewest others on the wrong side: noise and slips of single rows do not count.
     std::sort(rows.begin(), rows.end());
@@ -127,7 +128,7 @@ void cut_at_crack_length(const Experiment& test, const std::vector<double>& absc
         }
     }
     if (there == rows.end()) {
-        return;
+        return unbounded;
     }
     const double beyond = there->first;
     const std::string stop_text = fmt::format("{:g} mm", 1e3 * longest);
@@ -148,6 +149,7 @@ void cut_at_crack_length(const Experiment& test, const std::vector<double>& absc
         "{} on counts that it is that long; a later stop would take them in.",
         covered.remark.empty() ? "" : " ", test.name, stop_text, 1e3 * most, (by_time ? 1.0 : 1e3) * beyond,
         by_time ? "s" : "mm");
+    return beyond;
 }
 
 std::string data_file_of(const Experiment& test) {
@@ -248,60 +250,53 @@ void check_machine(const Study& study, std::size_t experiment, const Range& comp
     }
 }
 
-}  // namespace
+// What stands between the specimen and the record of an experiment, wherever its fitted numbers are in their bounds.
+struct MachineRanges {
+    Range compliance, force_offset, displacement_offset;
+};
 
-CoveredData covered_data(const Study& study, std::size_t experiment) {
-    const Experiment& test = study.experiments[experiment];
-    check_growth(test);
-    check_rate(study, experiment);
+std::string text_of(const Scene& scene, const RunEnd& end) {
+    if (end.key == "stop.crack_length") {
+        return fmt::format("{:g} mm", 1e3 * *scene.stop.crack_length);
+    }
+    return end.key == "stop.time" ? fmt::format("{:g} s", *scene.stop.time)
+                                  : fmt::format("{:g} mm", 1e3 * *scene.stop.displacement);
+}
+
+// Leaves out the rows that no run need come to.
+void cut_rows(const Experiment& test, const std::vector<double>& abscissa, bool by_time, const MachineRanges& machine,
+              CoveredData& covered) {
     const Curves& data = test.data;
-    const Range compliance = range_of(study, experiment, &Machine::compliance);
-    const Range force_offset = range_of(study, experiment, &Machine::force_offset);
-    const Range offset = range_of(study, experiment, &Machine::displacement_offset);
-    check_machine(study, experiment, compliance, force_offset, offset);
-    const bool by_time = !is_measured(data.displacement);
-    const std::vector<double>& abscissa = by_time ? data.time : data.displacement;
     const RunEnd end = end_of_runs(test.scene, by_time);
-    CoveredData covered{data, ""};
-    if (!is_measured(abscissa)) {
-        return covered;
-    }
-    const auto with_crack_cut = [&] {
-        cut_at_crack_length(test, abscissa, by_time, covered);
-        return covered;
-    };
-    if (end.at == unbounded) {
-        return with_crack_cut();
-    }
     double first = unbounded, last = -unbounded, beyond = unbounded;  // of the rows, and of those that no run need come to
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (std::isnan(abscissa[i])) {
             continue;
         }
         const double force = data.force.empty() ? std::nan("") : data.force[i];
-        const double at = by_time ? abscissa[i] : farthest(abscissa[i], force, compliance, force_offset, offset);
+        const double at =
+            by_time ? abscissa[i]
+                    : farthest(abscissa[i], force, machine.compliance, machine.force_offset, machine.displacement_offset);
         first = std::min(first, abscissa[i]);
         last = std::max(last, abscissa[i]);
         if (at > end.at * (1 + rounding)) {
             beyond = std::min(beyond, abscissa[i]);
         }
     }
+    if (beyond == unbounded) {
+        return;
+    }
     const char* const unit = by_time ? "s" : "mm";
     const double units = by_time ? 1.0 : 1e3;
-    const double stop = end.key == "stop.time" ? *test.scene.stop.time : 1e3 * *test.scene.stop.displacement;
-    const std::string stop_text = fmt::format("{:g} {}", stop, end.key == "stop.time" ? "s" : "mm");
     if (beyond <= first) {
         throw InputError(
-            file_of(test), end.key, stop_text,
+            file_of(test), end.key, text_of(test.scene, end),
             fmt::format("ends each run before the data begin, which go from {:g} to {:g} {}", units * first, units * last, unit));
-    }
-    if (beyond == unbounded) {
-        return with_crack_cut();
     }
     covered.remark =
         fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} on are left "
                     "out; a later stop would take them in.",
-                    test.name, end.key, stop_text, units * last, unit, units * beyond, unit);
+                    test.name, end.key, text_of(test.scene, end), units * last, unit, units * beyond, unit);
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (abscissa[i] >= beyond) {
             for (std::vector<double> Curves::*column :
@@ -312,7 +307,89 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
             }
         }
     }
-    return with_crack_cut();
+}
+
+// The first value of a column among the rows from a place on; infinite where there is none.
+double first_from(const std::vector<double>& column, const std::vector<double>& abscissa, double from) {
+    double first = unbounded;
+    for (std::size_t i = 0; i < column.size(); ++i) {
+        if (abscissa[i] >= from && !std::isnan(column[i])) {
+            first = std::min(first, column[i]);
+        }
+    }
+    return first;
+}
+
+// Leaves out the pictures that no run need come to. `grown` is from where on each run's crack has come to its end, as pictures
+// are timed.
+void cut_pictures(const Experiment& test, const MachineRanges& machine, double grown, CoveredData& covered) {
+    MeasuredFields& fields = *covered.fields;
+    const bool by_time = !fields.by_displacement;
+    const Curves& data = test.data;
+    std::optional<Curve> force;  // over the recorded displacement
+    if (!by_time && is_measured(data.displacement) && is_measured(data.force)) {
+        force.emplace(data.displacement, data.force);
+    }
+    RunEnd end = end_of_runs(test.scene, by_time);
+    const double units = by_time ? 1.0 : 1e3;
+    double beyond = unbounded;
+    std::size_t left_out = 0;
+    for (std::size_t k = 0; k < fields.instants.size(); ++k) {
+        const double instant = fields.instants[k];
+        const double at = by_time ? instant
+                                  : farthest(instant, force ? force->at(instant) : std::nan(""), machine.compliance,
+                                             machine.force_offset, machine.displacement_offset);
+        if (at > end.at * (1 + rounding) || instant >= grown) {
+            beyond = std::min(beyond, instant);
+            ++left_out;
+            fields.moved[k].assign(fields.moved[k].size(), Vec2::Constant(std::nan("")));
+        }
+    }
+    if (left_out == 0) {
+        return;
+    }
+    if (beyond >= grown) {
+        end.key = "stop.crack_length";
+    }
+    const bool any_left = std::ranges::any_of(fields.moved, [](const std::vector<Vec2>& moved) {
+        return std::ranges::any_of(moved, [](const Vec2& point) { return point.allFinite(); });
+    });
+    if (!any_left) {
+        throw InputError(file_of(test), end.key, text_of(test.scene, end),
+                         fmt::format("ends each run before the pictures of {}, from {:.4g} {} on", fields.file.string(),
+                                     units * beyond, by_time ? "s" : "mm"));
+    }
+    covered.remark += fmt::format(
+        "{}{}: {} = {} ends the runs before {} of {} pictures, from {:.4g} {} on: they are left out; a later stop would take "
+        "them in.",
+        covered.remark.empty() ? "" : " ", test.name, end.key, text_of(test.scene, end), left_out, fields.instants.size(),
+        units * beyond, by_time ? "s" : "mm");
+}
+
+}  // namespace
+
+CoveredData covered_data(const Study& study, std::size_t experiment) {
+    const Experiment& test = study.experiments[experiment];
+    check_growth(test);
+    check_rate(study, experiment);
+    const MachineRanges machine{range_of(study, experiment, &Machine::compliance),
+                                range_of(study, experiment, &Machine::force_offset),
+                                range_of(study, experiment, &Machine::displacement_offset)};
+    check_machine(study, experiment, machine.compliance, machine.force_offset, machine.displacement_offset);
+    const bool by_time = !is_measured(test.data.displacement);
+    const std::vector<double>& abscissa = by_time ? test.data.time : test.data.displacement;
+    CoveredData covered{test.data, test.fields, ""};
+    double grown = unbounded;
+    if (is_measured(abscissa)) {
+        cut_rows(test, abscissa, by_time, machine, covered);
+        grown = cut_at_crack_length(test, abscissa, by_time, covered);
+    }
+    if (covered.fields) {
+        const bool as_pictures = by_time != covered.fields->by_displacement;
+        const std::vector<double>& other = by_time ? test.data.displacement : test.data.time;
+        cut_pictures(test, machine, as_pictures || grown == unbounded ? grown : first_from(other, abscissa, grown), covered);
+    }
+    return covered;
 }
 
 }  // namespace crampfit

@@ -37,8 +37,19 @@ std::uint64_t fingerprint(const Study& study) {
         const Curves& data = experiment.data;
         print.add(data.time).add(data.displacement).add(data.force).add(data.crack_length);
         const Noise& noise = experiment.noise;
-        for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time}) {
+        for (const auto& sigma : {noise.force, noise.crack_length, noise.displacement, noise.time, noise.displacement_field}) {
             print.add(sigma.value_or(0.0));
+        }
+        if (const auto& fields = experiment.fields) {
+            print.add(fields->instants).add(fields->by_displacement ? 1.0 : 0.0);
+            for (const Vec2& place : fields->places) {
+                print.add(place.x()).add(place.y());
+            }
+            for (const std::vector<Vec2>& moved : fields->moved) {
+                for (const Vec2& point : moved) {
+                    print.add(point.x()).add(point.y());
+                }
+            }
         }
         print.add(experiment.weight);
         for (const MachineNumber& number : machine_numbers()) {

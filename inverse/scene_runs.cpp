@@ -67,11 +67,11 @@ bool had_less_time(const std::string& status, std::optional<double> limit) {
     return false;
 }
 
-/// The last records of each scene, by the numbers that were set in it; those that are on their way too.
+/// The last records of each scene, by what was asked of it; those that are on their way too.
 struct SceneRuns::Kept {
     static constexpr std::size_t most = 8;  // a scene
 
-    using Entry = std::pair<std::vector<double>, std::shared_future<Outcome>>;
+    using Entry = std::pair<Asked, std::shared_future<Outcome>>;
 
     std::mutex mutex;
     std::vector<std::deque<Entry>> of_scene;
@@ -122,7 +122,15 @@ SceneRuns::Outcome SceneRuns::run(std::size_t number, const Eigen::VectorXd& val
             numbers.push_back(value);
         }
     }
-    Outcome outcome = once(number, numbers);
+    const Probes& probes = scenes_[number]->output.probes;
+    Outcome outcome = once(number, {numbers, probes.instants});
+    const bool moved = machine.compliance != 0 || machine.displacement_offset != 0;
+    if (outcome.record && moved && probes.by_displacement && !probes.instants.empty()) {
+        // Pictures that are timed by what was recorded: when that was, the run itself tells.
+        const double before = outcome.seconds;
+        outcome = once(number, {numbers, displacements_of_run(*outcome.record, machine, probes.instants)});
+        outcome.seconds += before;
+    }
     const bool seen_through = machine.compliance != 0 || machine.force_offset != 0 || machine.displacement_offset != 0;
     if (outcome.record && seen_through) {
         outcome.record = std::make_shared<const Record>(as_recorded(*outcome.record, machine));
@@ -132,17 +140,18 @@ SceneRuns::Outcome SceneRuns::run(std::size_t number, const Eigen::VectorXd& val
 }
 
 // The kept outcome, which cost nothing now, or one to be kept.
-SceneRuns::Outcome SceneRuns::once(std::size_t number, const std::vector<double>& numbers) const {
+SceneRuns::Outcome SceneRuns::once(std::size_t number, const Asked& asked) const {
     std::promise<Outcome> promise;
     std::shared_future<Outcome> known;
     {
         const std::lock_guard lock(kept_->mutex);
         std::deque<Kept::Entry>& entries = kept_->of_scene[number];
-        const auto entry = std::find_if(entries.begin(), entries.end(), [&](const Kept::Entry& e) { return e.first == numbers; });
+        const auto entry = std::find_if(entries.begin(), entries.end(), [&](const Kept::Entry& e) { return e.first == asked; });
         if (entry != entries.end()) {
             known = entry->second;
+            std::rotate(entry, entry + 1, entries.end());  // to the back, as the one used last
         } else {
-            entries.emplace_back(numbers, promise.get_future().share());
+            entries.emplace_back(asked, promise.get_future().share());
             if (entries.size() > Kept::most) {
                 entries.pop_front();
             }
@@ -153,12 +162,12 @@ SceneRuns::Outcome SceneRuns::once(std::size_t number, const std::vector<double>
         outcome.seconds = 0;
         return outcome;
     }
-    const Outcome outcome = run_scene(number, numbers);
+    const Outcome outcome = run_scene(number, asked);
     promise.set_value(outcome);
     return outcome;
 }
 
-SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const std::vector<double>& numbers) const {
+SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const Asked& asked) const {
     const auto begin = std::chrono::steady_clock::now();
     Outcome outcome;
     try {
@@ -166,9 +175,10 @@ SceneRuns::Outcome SceneRuns::run_scene(std::size_t number, const std::vector<do
         std::size_t next = 0;
         for (const Setting& setting : settings_[number]) {
             if (!setting.of_machine) {
-                set_number(scene, setting.key, numbers[next++]);
+                set_number(scene, setting.key, asked.numbers[next++]);
             }
         }
+        scene.output.probes.instants = asked.pictures;
         TimeLimit limit(time_limit_, stop_);
         Record record = forward_(scene, limit.stop());
         const bool ended = record.status == RunStatus::finished || record.status == RunStatus::split;

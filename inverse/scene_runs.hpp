@@ -44,8 +44,13 @@ class SceneRuns {
     };
     struct Kept;
 
-    Outcome run_scene(std::size_t scene, const std::vector<double>& numbers) const;
-    Outcome once(std::size_t scene, const std::vector<double>& numbers) const;
+    struct Asked {
+        std::vector<double> numbers;   // that are set in the scene
+        std::vector<double> pictures;  // where its probes are read [s] or [m]
+        bool operator==(const Asked&) const = default;
+    };
+    Outcome run_scene(std::size_t scene, const Asked& asked) const;
+    Outcome once(std::size_t scene, const Asked& asked) const;
 
     std::vector<const Scene*> scenes_;
     std::vector<Machine> machines_;  // of the experiments; none for a scene alone

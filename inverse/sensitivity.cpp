@@ -299,7 +299,14 @@ StudyFunction output_function(const Study& study, const std::atomic<bool>* stop)
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 
-std::size_t output_count(const Study& study) { return OutputModel(study, Forward(), nullptr).names().size(); }
+std::vector<std::string> output_names(const Study& study) {
+    std::vector<std::string> names;
+    const OutputModel model(study, Forward(), nullptr);
+    for (const auto& output : model.names()) {
+        names.push_back(output.name);
+    }
+    return names;
+}
 
 std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
     const KeptWalks walks(study);

@@ -43,8 +43,8 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
 /// may be null. Throws as `study_sensitivity` does.
 StudyFunction output_function(const Study& study, const std::atomic<bool>* stop = nullptr);
 
-/// How many they are. Throws as `study_sensitivity` does.
-std::size_t output_count(const Study& study);
+/// What they are called. Throws as `study_sensitivity` does.
+std::vector<std::string> output_names(const Study& study);
 
 /// Their derivatives by the parameters. Absent where there are none, or a run failed.
 std::optional<Eigen::MatrixXd> output_slopes(const Study& study, const Eigen::VectorXd& values,

@@ -43,6 +43,7 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
     for (std::size_t i = 0; i < tests_.size(); ++i) {
         const CoveredData covered = covered_data(study, i);
         tests_[i].data = covered.curves;
+        tests_[i].fields = covered.fields;
         left_out_.push_back(covered.remark);
     }
     for (const Experiment& experiment : tests_) {

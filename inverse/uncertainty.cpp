@@ -87,6 +87,21 @@ class Undetermined {
     std::vector<Untold> untold_;
 };
 
+// What the data leave at the lowest point without priors, in standard deviations: what a prior pulls off the data is no lack of
+// fit.
+Eigen::VectorXd left_by_data(const Directions& directions, const Eigen::VectorXd& weights) {
+    const Eigen::Index data = weights.size();
+    const Eigen::VectorXd& all = directions.best.evaluation->residuals;
+    Eigen::VectorXd left = all.head(data);
+    if (all.size() > data) {
+        const Eigen::MatrixXd slope = directions.slope.topRows(data);
+        const Eigen::VectorXd pulled =
+            slope.completeOrthogonalDecomposition().solve(directions.weight.head(data).cwiseProduct(left));
+        left -= directions.model.jacobian().topRows(data) * pulled;
+    }
+    return left.cwiseQuotient(weights.cwiseSqrt());
+}
+
 // What data and priors know of the best point in the parameters' units of a window.
 struct Knowledge {
     Eigen::MatrixXd covariance;  // told + that of what cannot be told
@@ -221,15 +236,17 @@ Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& cur
         result.message = "Too few runs ended well near the best one to tell how sure it is: the intervals are the whole box. ";
         return result;
     }
-    const double time = correlation_time(residuals, curves.lengths);
-    const double widening = std::max(1.0, result.reduced_chi_square * time);
+    const Eigen::VectorXd left = left_by_data(*directions, weights);
+    const double chi_square = left.squaredNorm() / std::max(1, count - p);
+    const double time = correlation_time(left, curves.lengths);
+    const double widening = std::max(1.0, chi_square * time);
     int independent = count;
     if (widening > 1) {
         independent = static_cast<int>(count / time);
         result.message += fmt::format("Standard errors are widened by {:.3g}: the misfit is {:.3g} times what the "
                                       "noise explains, and {:.3g} neighbouring "
                                       "residuals count as one. ",
-                                      std::sqrt(widening), result.reduced_chi_square, time);
+                                      std::sqrt(widening), chi_square, time);
     }
     Undetermined undetermined(names, window);
     const auto in_box = [&](const Eigen::MatrixXd& covariance) -> Eigen::MatrixXd {

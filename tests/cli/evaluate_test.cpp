@@ -76,6 +76,15 @@ TEST(SystemCommand, EvaluateGivesOutputsAndTheirGradients) {
     EXPECT_NEAR(n[0], peak, 1e-9 * peak);
     ASSERT_EQ(command.evaluate(request("90", "60", {0, 1})).status, 0);
     EXPECT_EQ(command.numbers(), std::vector<double>{n[1]});
+    // By name, in another order.
+    std::string named = request("90", "60", {3, 3});
+    named.replace(named.find(":f1"), 3, ":initial_stiffness").replace(named.find(":f2"), 3, ":peak_force");
+    ASSERT_EQ(command.evaluate(named).status, 0);
+    EXPECT_EQ(command.numbers(), (std::vector<double>{n[1], n[0], n[4], n[5], n[2], n[3]}));
+    named.replace(named.find(":peak_force"), 11, ":peak_farce");
+    const Outcome unknown = command.evaluate(named);
+    EXPECT_EQ(unknown.status, 2);
+    EXPECT_TRUE(contains(unknown.error, "did you mean \"peak_force\"?")) << unknown.error;
     // An output that the run does not have matters only where it is asked for.
     command.folder.write("study.toml", "scene = \"scene.toml\"\noutputs = [\"peak force\", \"arrest length 1\"]\n" + parameters);
     ASSERT_EQ(command.evaluate(request("90", "60", {1, 0})).status, 0);

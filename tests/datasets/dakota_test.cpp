@@ -65,6 +65,34 @@ TEST(UnitDakota, ReadsBothFormats) {
     EXPECT_EQ(request.labels, std::vector<std::string>{""});
 }
 
+TEST(UnitDakota, FunctionsGoByTheOutputsNames) {
+    const std::vector<std::string> names{"peak force", "force at 0.3 mm", "work of fracture"};
+    const auto asked = [&](const std::vector<std::string>& labels) {
+        DakotaRequest request;
+        request.labels = labels;
+        return outputs_asked_for(request, names, "params.in");
+    };
+    const std::vector<std::size_t> in_order{0, 1, 2};
+    EXPECT_EQ(asked({"work_of_fracture", "peak_force", "force_at_0.3_mm"}), (std::vector<std::size_t>{2, 0, 1}));
+    EXPECT_EQ(asked({"", "", ""}), in_order);
+    EXPECT_EQ(asked({"f1", "f2", "f3"}), in_order);
+    EXPECT_EQ(asked({"response_fn_1", "response_fn_2", "response_fn_3"}), in_order);
+    const std::pair<std::vector<std::string>, std::string> wrong[] = {
+        {{"peak_force", "peak_force", "work_of_fracture"}, "ASV_2"},
+        {{"peak_force", "f2", "work_of_fracture"}, "ASV_2"},
+        {{"f2", "f1", "f3"}, "ASV_1"},
+        {{"f1", "f2", "work_of_fractur"}, "ASV_3"},
+    };
+    for (const auto& [labels, key] : wrong) {
+        try {
+            asked(labels);
+            ADD_FAILURE() << "no error for " << labels[1];
+        } catch (const InputError& error) {
+            EXPECT_EQ(error.key, key) << error.what();
+        }
+    }
+}
+
 TEST(UnitDakota, WritesValuesThenGradientsThatWereAskedFor) {
     const TemporaryFolder folder;
     const DakotaRequest request = read_dakota_request(folder.write("params.in", standard));

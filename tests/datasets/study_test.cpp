@@ -1,3 +1,4 @@
+#include "datasets/displacement_field.hpp"
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
 #include "tests/datasets/full_results.hpp"
@@ -216,6 +217,7 @@ TEST(UnitStudy, PhotographOfACrack) {
     refused(R"({ track = "none.h5" })", ".track", "no such file");
     refused(R"({ tracks = "track.h5" })", ".tracks", "did you mean \"track\"?");
     refused(R"({ track = "track.h5", pixel = "0 um" })", ".pixel", "greater than 0");
+    refused(R"({ track = "track.h5", pixel = "40 um" })", ".pixel", "contradicts the file, whose pixel is 50 um");
     refused(R"({ track = "track.h5", offset = ["1 m", "0 m"] })", "", "does not lie on the specimen");
     track.tips[0] = {.status = TipStatus::no_crack};
     write(track, folder / "track.h5");
@@ -223,6 +225,30 @@ TEST(UnitStudy, PhotographOfACrack) {
     track.rows = 0;
     write(track, folder / "track.h5");
     refused(R"({ track = "track.h5" })", ".track", "size of the pictures");
+}
+
+TEST(UnitStudy, FieldsHaveOnePixel) {
+    const StudyFolder folder;
+    FieldSeries series;
+    series.images = {"image.png"};
+    series.lattice = {2, 2, 20, 20, 20};
+    series.subset = 21;
+    series.pixel = 50e-6;
+    series.columns = series.rows = 60;
+    series.time = {1.0};
+    const std::vector<double> zero(4, 0.0), small(4, 0.01);
+    const DisplacementField field{zero, zero, zero, zero, zero, zero, small, std::vector(4, PointStatus::ok)};
+    write_fields(
+        series, [&](int) { return field; }, folder / "field.h5");
+    const auto read = [&](const std::string& pixel) {
+        std::string text = good_study;
+        text.insert(text.find("weight = 2.0"), "fields = { file = \"field.h5\"" + pixel + " }\n");
+        return *folder.read(text).experiments[0].fields;
+    };
+    EXPECT_DOUBLE_EQ(read("").subset, 21 * 50e-6);
+    EXPECT_DOUBLE_EQ(read(", pixel = \"0.05 mm\"").subset, 21 * 50e-6);
+    expect_error((folder / "study.toml").string(), "experiments.wedge 1.fields.pixel",
+                 "contradicts the file, whose pixel is 50 um", [&] { read(", pixel = \"40 um\""); });
 }
 
 TEST(UnitStudy, ACrackFitsIntoItsSpecimen) {

@@ -39,7 +39,7 @@ TEST(UnitCurve, MeanIsTheIntegralOfThePolygon) {
     EXPECT_NEAR(coarse.mean(0.5, 2), (0.5 * (2 + 4) * 0.5 + 0.5 * (4 + 2)) / 1.5, 1e-14);
     EXPECT_NEAR(coarse.mean(0.1, 2.9), fine.mean(0.1, 2.9), 1e-14);
     EXPECT_DOUBLE_EQ(coarse.mean(2, 2), coarse.at(2));
-    EXPECT_EQ(fine.count(0.3, 1.7), 2);
+    EXPECT_EQ(fine.rows(0.3, 1.7), 2);
 }
 
 TEST(UnitCurve, SmoothingKeepsAStraightLineUpToItsEnds) {

@@ -2,6 +2,8 @@
 #include "forward/simulate.hpp"
 #include "inverse/field_comparison.hpp"
 #include "inverse/fit.hpp"
+#include "inverse/machine.hpp"
+#include "inverse/run_end.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +14,7 @@
 namespace crampfit::testing {
 namespace {
 
-constexpr double pixel = 20e-6;                                  // [m]
+constexpr double pixel = 20e-6;                                        // [m]
 constexpr double earlywood_modulus = 60e6, latewood_modulus = 1000e6;  // E [Pa]
 
 // A strip of 20 x 10 mm between grips, its growth rings across the pull.
@@ -173,6 +175,99 @@ TEST(UnitFields, PointsAtTheSimulatedCrackAreLeftOut) {
     }
     ASSERT_GT(near, 20u);
     EXPECT_LT(misfit(FieldComparison(measured), record), 1e-9);
+}
+
+// Of pictures at 0.075 and 0.15 mm, 7.5 and 15 s, those that runs come to. The crack, where there is a table of its length, is
+// 4 mm long until `grown` and 6 mm then.
+CoveredData covered_pictures(bool by_displacement, double stop, double grown = 0) {
+    Study study;
+    Experiment& test = study.experiments.emplace_back();
+    test.name = "strip";
+    test.scene = strip(0.5e-3);
+    test.scene.stop.displacement = stop;
+    test.fields = lattice_of_subsets();
+    test.fields->by_displacement = by_displacement;
+    if (!by_displacement) test.fields->instants = {7.5, 15.0};
+    test.fields->moved.assign(2, std::vector<Vec2>(test.fields->places.size(), Vec2::Zero()));
+    test.fields->sigma.assign(2, std::vector<double>(test.fields->places.size(), 1e-6));
+    for (int i = 0; grown > 0 && i <= 20; ++i) {
+        test.data.displacement.push_back(0.01e-3 * i);
+        test.data.time.push_back(test.data.displacement.back() / 1e-5);
+        test.data.crack_length.push_back(test.data.displacement.back() < grown ? 4e-3 : 6e-3);
+        test.scene.stop.crack_length = 5e-3;
+    }
+    if (grown > 0) {
+        Crack crack;
+        crack.grows = Growth::end;
+        test.scene.cracks = {crack};
+    }
+    return covered_data(study, 0);
+}
+
+TEST(UnitFields, PicturesBeyondTheEndOfTheRunsAreLeftOut) {
+    for (const bool by_displacement : {false, true}) {
+        const auto are_left = [&](const CoveredData& covered) {
+            return std::pair(covered.fields->moved[0][0].allFinite(), covered.fields->moved[1][0].allFinite());
+        };
+        const CoveredData all = covered_pictures(by_displacement, 0.15e-3);
+        EXPECT_EQ(are_left(all), std::pair(true, true));
+        EXPECT_EQ(all.remark, "");
+        const CoveredData one = covered_pictures(by_displacement, 0.149e-3);
+        EXPECT_EQ(are_left(one), std::pair(true, false));
+        EXPECT_NE(one.remark.find("stop.displacement = 0.149 mm ends the runs before 1 of 2 pictures"), std::string::npos)
+            << one.remark;
+        try {
+            covered_pictures(by_displacement, 0.07e-3);
+            ADD_FAILURE() << "no error";
+        } catch (const InputError& error) {
+            EXPECT_EQ(error.key, "stop.displacement");
+        }
+        const CoveredData longer = covered_pictures(by_displacement, 1e-3, 0.1e-3);  // than the crack at which runs end
+        EXPECT_EQ(are_left(longer), std::pair(true, false));
+        EXPECT_NE(longer.remark.find("stop.crack_length = 5 mm ends the runs before 1 of 2 pictures"), std::string::npos)
+            << longer.remark;
+    }
+    // Its stations are those of the one that is left.
+    Experiment test;
+    test.fields = covered_pictures(true, 0.149e-3).fields;
+    const FieldComparison comparison(test);
+    EXPECT_EQ(comparison.stations().size(), 2 * test.fields->places.size());
+    EXPECT_NE(comparison.remark().find("in 1 pictures"), std::string::npos) << comparison.remark();
+}
+
+// The model sees the pictures where u + compliance F + displacement_offset comes to the recorded displacement: with data of its
+// own nothing is left, and the derivatives are those of differences.
+TEST(GradientFields, PicturesByRecordedDisplacementAreSeenThroughTheMachine) {
+    constexpr double cell = 0.5e-3;
+    Experiment measured = measure(strip(cell), lattice_of_subsets(), 0.0, 1);
+    measured.noise.displacement_field = 0.01 * pixel;
+    const Record record = simulate(strip(cell));
+    const double stiffness = record.series.back().force / record.series.back().displacement;
+    measured.machine = {0.3 / stiffness, 0.5, 4e-6};
+    const Record seen = as_recorded(record, measured.machine);
+    measured.data = {};
+    for (const Instant& row : seen.series) {
+        measured.data.displacement.push_back(row.displacement);
+        measured.data.force.push_back(row.force);
+    }
+    for (double& at : measured.fields->instants) at = 1.3 * at + 4e-6;  // without the machine 0.075 and 0.15 mm
+    Study study = study_of(measured, cell);
+    study.experiments[0].scene.stop.displacement = 0.16e-3;
+    const StudyFunction function = fit_function(study, nullptr);
+    const Eigen::Vector2d truth(earlywood_modulus, latewood_modulus);
+    const Evaluation there = function(truth, 1);
+    ASSERT_TRUE(there.usable()) << there.status;
+    EXPECT_LT(there.residuals.cwiseAbs().maxCoeff(), 1e-4);
+    const Eigen::Vector2d aside(1.1 * earlywood_modulus, 0.9 * latewood_modulus);
+    const auto slopes = fit_slopes(study, aside, nullptr);
+    ASSERT_TRUE(slopes);
+    for (int j = 0; j < 2; ++j) {
+        Eigen::Vector2d step = Eigen::Vector2d::Zero();
+        step[j] = 1e-3 * aside[j];
+        const Eigen::VectorXd difference =
+            (function(aside + step, 1).residuals - function(aside - step, 1).residuals) / (2 * step[j]);
+        EXPECT_LT((slopes->col(j) - difference).norm(), 1e-4 * difference.norm());
+    }
 }
 
 TEST(UnitFields, ASubsetIsAveragedAsItsWarpIsFitted) {

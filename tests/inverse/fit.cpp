@@ -417,14 +417,14 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
 }
 
 // What data and prior say together is their weighted mean, however far apart they are: the prior tells nothing of what the model
-// knows. Lack of fit widens what the data say; the interval holds the fit.
+// knows, and is no lack of fit, which would weaken the data in the posterior. The interval holds the fit.
 TEST(SystemFit, APriorAgainstTheDataIsNoErrorOfTheModel) {
     const BarTest bar;
     const double error = 1 / std::sqrt(bar.information);
     for (const char* method : {"auto", "bobyqa"}) {
         Study study = bar.study();
         study.optimizer.method = method;
-        study.uncertainty.profile = true;
+        study.uncertainty = {.profile = true, .posterior = 1500};
         study.parameters[0].prior = Prior{(bar.least_squares + 10 * error) * 1e6, 0.5 * error * 1e6};
         FitOptions options;
         options.threads = 1;
@@ -435,6 +435,14 @@ TEST(SystemFit, APriorAgainstTheDataIsNoErrorOfTheModel) {
         EXPECT_NE(fit.message.find("contradict each other"), std::string::npos) << fit.message;
         EXPECT_GT(E.lower_95, E.value - 20 * E.standard_error) << method;
         EXPECT_LT(E.upper_95, E.value + 20 * E.standard_error) << method;
+        double mean = 0, squares = 0;
+        for (const PosteriorSample& sample : fit.posterior) {
+            mean += sample.parameters[0] / 1500;
+            squares += std::pow(sample.parameters[0], 2) / 1500;
+        }
+        // The weights are 1 of the data and 4 of the prior; some 200 of the samples are independent.
+        EXPECT_NEAR((mean - bar.least_squares) / error, 8, 0.1) << method;
+        EXPECT_NEAR(std::sqrt(squares - mean * mean) / error, 1 / std::sqrt(5.0), 0.05) << method;
     }
 }
 
