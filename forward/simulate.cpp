@@ -340,8 +340,8 @@ Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& 
 class Standstill {
   public:
     Standstill(const Scene& scene, const Plan& plan) {
-        const Travel travel = travel_of(scene);
-        since_ = last_ = std::isfinite(plan.end_time) ? plan.end_time : travel.fastest > 0.0 ? travel.until : 0.0;
+        const bool ends_anyway = std::isfinite(plan.end_time) || plan.remembers;  // or creeps on
+        since_ = last_ = ends_anyway ? std::numeric_limits<double>::infinity() : plan.driven ? plan.still_from : 0.0;
         least_ = steps_across * plan.time_step * scene.specimen.size.maxCoeff() / scene.model.cell;
     }
 
