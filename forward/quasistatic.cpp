@@ -514,6 +514,18 @@ bool Quasistatic::find(std::size_t number, int time) {
     return true;
 }
 
+const Equilibrium* Quasistatic::stand_at_last() {
+    for (auto number = way_.rbegin(); number != way_.rend(); ++number) {
+        const Place& place = places_[*number];
+        if (place.known.empty() || place.known.rbegin()->first == 0) continue;
+        const Known& last = place.known.rbegin()->second;
+        enter(place);
+        equilibrium_.set_displacements(last.displacement, time_of(last.time), last.contacts);
+        return &equilibrium_;
+    }
+    return nullptr;
+}
+
 // Knows a place, and the one an advance further, at a time.
 bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(number, time)) return false;

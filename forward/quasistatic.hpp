@@ -80,6 +80,10 @@ class Quasistatic {
     int equilibria() const { return equilibria_; }           // solved for so far, of the finer grid
     long points() const { return body_.points.count(); }
 
+    /// Goes to the last equilibrium that it knows of the last station that has one, of a scene that is not linear; null: none.
+    const Equilibrium* stand_at_last();
+    const Discretisation& body() const { return body_; }
+
   private:
     struct Known {                       // an equilibrium of this grid
         int time;                        // its number

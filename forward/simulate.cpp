@@ -138,44 +138,21 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
                     100.0 * (with / without - 1.0), 1e3 * last->displacement);
 }
 
-// Whether it is worth a look at the end: a body with corners, or bonded and moving, or near a crack, or a crack that does not
-// open.
-bool may_be_beyond_contact(const Scene& scene, const Record& record) {
-    const Instant& last = record.series.back();
-    const auto opens = [&](int crack) {
-        if (crack == record.tracked_crack) return last.K_I > 0.0;
-        return record.cracks[crack - (crack > record.tracked_crack)].K_I.back() > 0.0;
-    };
-    for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
-        if (!opens(k)) return true;
-    const double time = std::isfinite(last.time) ? last.time : 0.0;
-    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-        const Body& rigid = scene.bodies[b];
-        const Vec2 way = travel(scene, static_cast<int>(scene.edges.size() + b), time);
-        const bool slides = rigid.contact.kind != Contact::Kind::bonded;
-        if (slides ? std::holds_alternative<Polygon>(rigid.shape) : !way.isZero(0.0)) return true;
-        // Wood goes no farther than the body, or than what is measured.
-        const Vec2 reach = Vec2::Constant(way.norm() + std::abs(last.displacement) + 2.0 * scene.model.cell);
-        const Box at = bounds(rigid.shape), near{at.low + way - reach, at.high + way + reach};
-        for (const std::vector<Vec2>& path : record.paths)
-            for (std::size_t k = 0; slides && k + 1 < path.size(); ++k)
-                if (near.touches({path[k].cwiseMin(path[k + 1]), path[k].cwiseMax(path[k + 1])})) return true;
-    }
-    return false;
-}
-
 // Says so where contact at the end is more than its models hold for.
 void judge_contact(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                    Quasistatic& walk, Record& record) {
-    if ((plan.linear && scene.bodies.empty()) || !may_be_beyond_contact(scene, record)) return;
-    const SeriesPlace last{record.series.size() - 1, 0.0};
-    Revisit revisit(scene, plan, materials, body, walk);
-    if (!revisit.to(record, last)) return;
-    const Equilibrium& equilibrium = revisit.equilibrium();
-    std::vector<Vec2> moved;
-    for (int driver = equilibrium.boundary().first_body(); driver < equilibrium.boundary().drivers(); ++driver)
-        moved.push_back(travel(scene, driver, equilibrium.time()) + equilibrium.contacts().moved[driver]);
-    record.message += beyond_contact(scene, revisit.body(), equilibrium.cracks(), equilibrium.displacements(), moved);
+    const auto judge = [&](const Discretisation& there, const Equilibrium& equilibrium) {
+        std::vector<Vec2> moved;
+        for (int driver = equilibrium.boundary().first_body(); driver < equilibrium.boundary().drivers(); ++driver)
+            moved.push_back(travel(scene, driver, equilibrium.time()) + equilibrium.contacts().moved[driver]);
+        record.message += beyond_contact(scene, there, equilibrium.cracks(), equilibrium.displacements(), moved);
+    };
+    if (!plan.linear) {
+        if (const Equilibrium* equilibrium = walk.stand_at_last()) judge(walk.body(), *equilibrium);
+    } else if (!scene.bodies.empty()) {
+        Revisit revisit(scene, plan, materials, body, walk);
+        if (revisit.to(record, {record.series.size() - 1, 0.0})) judge(revisit.body(), revisit.equilibrium());
+    }
 }
 
 // How much wood there is straight ahead of a point [m].
