@@ -17,6 +17,7 @@ constexpr double counts_as_overlap = 0.1;  // depth of a face in a body [cells]
 constexpr double beside = 0.25;            // of a crack there is wood on both sides [cells]
 constexpr double near_corner = 0.75;       // [cells]
 constexpr double deep_in_bonded = 0.25;    // [cells]
+constexpr double hair = 1e-6;              // of a side
 constexpr double least_to_sides = 0.26;    // sine of the angle from a corner's sides to the wood that lies about it [15 degrees]
 
 // A place on a crack with wood on both sides, as they lie now.
@@ -63,24 +64,22 @@ bool presses_on(const std::vector<Vec2>& corners, std::size_t k, const Shape& sh
                 const std::vector<Vec2>& displacement, const Vec2& moved) {
     const std::size_t n = corners.size();
     const Vec2 before = corners[k] - corners[(k + n - 1) % n], after = corners[(k + 1) % n] - corners[k];
-    const auto out_of = [&](const Vec2& side) -> Vec2 {
+    const auto out_of = [&](const Vec2& side, const Vec2& middle) -> Vec2 {
         const Vec2 normal = left_of(side).normalized();
-        return inside(shape, corners[k] - 0.5 * side + 1e-6 * side.norm() * normal) ? -normal : normal;
+        return inside(shape, middle + hair * side.norm() * normal) ? -normal : normal;
     };
-    const Vec2 first = out_of(before), second = [&] {
-        const Vec2 normal = left_of(after).normalized();
-        return inside(shape, Vec2(corners[k] + 0.5 * after + 1e-6 * after.norm() * normal)) ? Vec2(-normal) : normal;
-    }();
-    if (inside(shape, corners[k] + 1e-6 * std::min(before.norm(), after.norm()) * (first + second).normalized())) return false;
+    const Vec2 first = out_of(before, corners[k] - 0.5 * before), second = out_of(after, corners[k] + 0.5 * after);
+    if (inside(shape, corners[k] + hair * std::min(before.norm(), after.norm()) * (first + second).normalized())) return false;
+    // Which way round from the first normal to the second.
+    const auto cross = [](const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); };
+    const double way = cross(first, second) > 0.0 ? 1.0 : -1.0;
     const double cell = body.layout.cell.minCoeff();
     for (const Facet& facet : body.facets) {
         const Vec2 x = place_of(facet, body, displacement) - moved;
         if ((x - corners[k]).norm() > near_corner * cell || !inside(shape, x)) continue;
         const Vec2 toward = -(Polar(gradient_at(body, facet.point, displacement)).turn * facet.normal);
-        const double sine = first.x() * second.y() - first.y() * second.x();
-        const double from_first = (first.x() * toward.y() - first.y() * toward.x()) * (sine > 0.0 ? 1.0 : -1.0);
-        const double to_second = (toward.x() * second.y() - toward.y() * second.x()) * (sine > 0.0 ? 1.0 : -1.0);
-        if (toward.dot(first + second) > 0.0 && from_first > least_to_sides && to_second > least_to_sides) return true;
+        const double to_sides = std::min(way * cross(first, toward), way * cross(toward, second));
+        if (toward.dot(first + second) > 0.0 && to_sides > least_to_sides) return true;
     }
     return false;
 }
