@@ -1,7 +1,6 @@
 #include "forward/boundary.hpp"
 
 #include "datasets/error.hpp"
-#include "forward/loading.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -430,7 +429,7 @@ Vec2 Boundary::velocity_of(int driver) const {
     return {edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)};
 }
 
-Vec2 Boundary::travel(int driver, double time) const { return crampfit::travel(scene_, driver, time); }
+Vec2 Boundary::travel(int driver, double time) const { return velocity_of(driver) * std::min(time, travel_time(driver)); }
 
 std::vector<Vec2> Boundary::load_to_move(int driver, const Vec2& direction, std::size_t fields) const {
     if (driver >= edges_ || !scene_.edges[driver].traction) return {};

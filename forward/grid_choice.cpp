@@ -27,7 +27,8 @@ constexpr double most_advances_a_cell = 2.0;
 
 constexpr double most_cells_chosen = 512;
 constexpr int multiple = 4;  // of cells: places on lines of the grids tried lie on lines of the chosen one
-// An error below this one asks for cells that show bands of stiff wood.
+
+// An error below this one asks for so many cells across bands of stiff wood, where no more than that across the smaller side do.
 constexpr double least_for_bands = 0.02;
 constexpr double cells_in_band = 2.0, most_cells_for_bands = 256;
 
@@ -176,6 +177,7 @@ std::optional<double> width_of_bands(const Scene& scene) {
     constexpr int samples = 512;  // across the smaller side
     constexpr double most = 0.7, much_stiffer = 4.0, stiff = 0.5;
     const MaterialMap materials(scene);
+    if (materials.homogeneous()) return {};
     const double pitch = scene.specimen.size.minCoeff() / samples;
     const int columns = static_cast<int>(scene.specimen.size.x() / pitch),
               rows = static_cast<int>(scene.specimen.size.y() / pitch);

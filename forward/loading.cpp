@@ -85,16 +85,6 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
-Vec2 travel(const Scene& scene, int driver, double time) {
-    const auto edges = static_cast<int>(scene.edges.size());
-    const auto gone = [&](const Vec2& velocity, const std::optional<double>& until) -> Vec2 {
-        return velocity * std::min(time, until.value_or(infinity));
-    };
-    if (driver >= edges) return gone(scene.bodies[driver - edges].velocity, scene.bodies[driver - edges].until);
-    const Edge& edge = scene.edges[driver];
-    return gone({edge.velocity[0].value_or(0.0), edge.velocity[1].value_or(0.0)}, edge.until);
-}
-
 std::string advice_on_holds(const Scene& scene) {
     const bool slides =
         std::ranges::all_of(scene.bodies, [](const Body& body) { return body.contact.kind == Contact::Kind::frictionless; });

@@ -50,7 +50,4 @@ struct Travel {
 
 Travel travel_of(const Scene& scene);
 
-/// How far an edge, or a body (numbered after the edges), has gone where that is prescribed [m].
-Vec2 travel(const Scene& scene, int driver, double time);
-
 }  // namespace crampfit

@@ -83,6 +83,7 @@ class Quasistatic {
     /// Goes to the last equilibrium that it knows of the last station that has one, of a scene that is not linear; null: none.
     const Equilibrium* stand_at_last();
     const Discretisation& body() const { return body_; }
+    const Boundary& boundary() const { return equilibrium_.boundary(); }
 
   private:
     struct Known {                       // an equilibrium of this grid

@@ -4,7 +4,6 @@
 #include "forward/deformation.hpp"
 #include "forward/explicit.hpp"
 #include "forward/grid_choice.hpp"
-#include "forward/loading.hpp"
 #include "forward/march.hpp"
 #include "forward/probes.hpp"
 #include "forward/quasistatic.hpp"
@@ -142,9 +141,10 @@ void judge_small_strain(const Scene& scene, const Plan& plan, const MaterialMap&
 void judge_contact(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                    Quasistatic& walk, Record& record) {
     const auto judge = [&](const Discretisation& there, const Equilibrium& equilibrium) {
+        const Boundary& boundary = equilibrium.boundary();
         std::vector<Vec2> moved;
-        for (int driver = equilibrium.boundary().first_body(); driver < equilibrium.boundary().drivers(); ++driver)
-            moved.push_back(travel(scene, driver, equilibrium.time()) + equilibrium.contacts().moved[driver]);
+        for (int driver = boundary.first_body(); driver < boundary.drivers(); ++driver)
+            moved.push_back(boundary.travel(driver, equilibrium.time()) + equilibrium.contacts().moved[driver]);
         record.message += beyond_contact(scene, there, equilibrium.cracks(), equilibrium.displacements(), moved);
     };
     if (!plan.linear) {

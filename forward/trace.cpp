@@ -352,7 +352,7 @@ class Tracer {
             double work = m.load.traction_work - before.load.traction_work;
             for (int d = 0; d < static_cast<int>(m.load.reactions.size()); ++d)
                 work += 0.5 * (before.load.reactions[d] + m.load.reactions[d])
-                                  .dot(travel(scene_, d, m.load.time) - travel(scene_, d, before.load.time));
+                                  .dot(walk_.boundary().travel(d, m.load.time) - walk_.boundary().travel(d, before.load.time));
             row.external_work = record_.series.back().external_work + work;
             // A jump turns what it releases beyond the toughness into motion, which is not followed.
             if (!jumped)
