@@ -1,11 +1,14 @@
 #include "forward/contact.hpp"
 
+#include "forward/deformation.hpp"
 #include "forward/local_yield.hpp"
 
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace crampfit {
@@ -35,6 +38,11 @@ constexpr double onset_in_cells = 0.0003;
 // Part of the stiffness that is there from the first touch, so that a body at rest on it is held.
 constexpr double at_touch = 0.1;
 
+// Faces of cracks feel sides of bodies whose normals lie so near to the wood's own, where these are not much farther than the
+// nearest side of all: the blunt end of a wedge does not open a crack that it only presses on.
+constexpr double sees_sides_within = std::numbers::pi / 3.0;
+constexpr double most_in_nearest = 3.0;
+
 // How deep x lies in the shape, which way out, and how curved. Nothing outside it.
 bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
     curvature = 0.0;
@@ -51,6 +59,19 @@ bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, doubl
     const OutlinePoint on = nearest_on_outline(shape, x);
     depth = on.distance;
     out = on.normal;
+    return true;
+}
+
+// The same of a face of a crack, with `toward` into its wood.
+bool depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward, double& depth, Vec2& out, double& curvature) {
+    if (!depth_in(shape, x, depth, out, curvature)) return false;
+    if (out.dot(toward) >= std::cos(sees_sides_within)) return true;
+    const auto* polygon = std::get_if<Polygon>(&shape);
+    if (!polygon) return false;
+    const auto side = nearest_facing(*polygon, x, toward, sees_sides_within);
+    if (!side || side->distance > most_in_nearest * depth) return false;
+    depth = side->distance;
+    out = side->normal;
     return true;
 }
 
@@ -84,24 +105,58 @@ bool is_small_circle(const Shape& shape, const Layout& layout) {
     return circle && circle->radius <= most_radius_in_cells * layout.cell.maxCoeff();
 }
 
-SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction)
-    : shape_(shape), body_(body), friction_(friction) {
+SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction, const FaceFacets* faces)
+    : shape_(shape), body_(body), faces_(faces), friction_(friction) {
     if (is_small_circle(shape, body.layout))
         width_ = std::min(width_in_cells * body.layout.cell.maxCoeff(), width_in_radii * std::get<Circle>(shape).radius);
-    goes_on_.resize(body.facets.size(), false);
-    find_joints(0, static_cast<int>(body.facets.size()) - 1);
-    find_holds();
-    const double h = body.layout.cell.minCoeff();
-    for (const Facet& f : body.facets) cut_off_.push_back(std::max(0.0, signed_depth(shape, f.position)));
-    for (const Facet& f : body.facets)
-        stiffness_.push_back(stiffness_in_cells * body.points.stiffest(f.point) / h * f.length * body.layout.thickness);
-    if (friction_ > 0.0)
-        for (const Facet& f : body.facets) place_.push_back(f.position);
+    add_facets();
+    for (int i = 0; i < outline(); ++i) find_joint(i);
+    for (int i = 0; i < outline(); ++i) find_holds(i);
 }
 
-// Whether facets from `first` to `last` go on smoothly. True where that is not what it was.
-bool SlidingBody::find_joints(int first, int last) {
+void SlidingBody::add_facets() {
+    for (int i = static_cast<int>(stiffness_.size()); i < facets(); ++i) {
+        cut_off_.push_back(std::max(0.0, signed_depth(shape_, facet(i).position)));
+        stiffness_.push_back(full_stiffness(i));
+        goes_on_.push_back(false);
+        holds_.push_back({{facet(i).point, facet(i).weight}});
+        is_stale_.push_back(i >= outline());
+        if (friction_ > 0.0) place_.push_back(facet(i).position);
+    }
+}
+
+double SlidingBody::full_stiffness(int i) const {
+    const double h = body_.layout.cell.minCoeff();
+    return stiffness_in_cells * body_.points.stiffest(facet(i).point) / h * facet(i).length * body_.layout.thickness;
+}
+
+void SlidingBody::take_in_faces(const Box& changed, const std::vector<double>& mass) {
+    add_facets();
+    std::vector<int> there;
+    for (int i = 0; i < facets(); ++i)
+        if (changed.contains(facet(i).position)) there.push_back(i);
+    for (const int i : there) {
+        if (i < outline()) continue;
+        holds_[i] = {{facet(i).point, facet(i).weight}};
+        is_stale_[i] = true;
+    }
+    if (most_frequency_squared_ == 0.0) return;
+    for (const int i : there) stiffness_[i] = full_stiffness(i);
+    soften(there, mass);
+}
+
+// The facet that goes on from one, along the outline or a face; -1: none.
+int SlidingBody::next(int facet, bool forth) const {
+    if (facet < outline()) return forth ? (facet + 1 < outline() ? facet + 1 : -1) : facet - 1;
+    const int on_face = faces_->next(facet - outline(), forth);
+    return on_face < 0 ? -1 : on_face + outline();
+}
+
+// Whether the next facet goes on smoothly. True where that is not what it was.
+bool SlidingBody::find_joint(int facet) {
     constexpr double touching = 1e-3, smooth = 0.9;  // of a facet's length; cosine
+    const int after = next(facet, true);
+    if (after < 0) return false;
     const Points& points = body_.points;
     const auto is_torn = [&](int p, int q) {  // a crack is between them where they see two fields of a node
         const auto nodes_p = body_.layout.cell_nodes(points.cell[p]), nodes_q = body_.layout.cell_nodes(points.cell[q]);
@@ -110,42 +165,42 @@ bool SlidingBody::find_joints(int first, int last) {
                 if (nodes_p[k] == nodes_q[l] && points.node[p][k] != points.node[q][l]) return true;
         return false;
     };
-    bool changed = false;
-    for (int i = first; i < last; ++i) {
-        const Facet &a = body_.facets[i], &b = body_.facets[i + 1];
-        const bool goes_on = std::abs((b.position - a.position).norm() - 0.5 * (a.length + b.length)) < touching * a.length &&
-                             a.normal.dot(b.normal) > smooth && (a.point == b.point || !is_torn(a.point, b.point));
-        changed |= std::exchange(goes_on_[i], goes_on) != goes_on;
-    }
-    return changed;
+    const Facet &a = this->facet(facet), &b = this->facet(after);
+    const bool goes_on = std::abs((b.position - a.position).norm() - 0.5 * (a.length + b.length)) < touching * a.length &&
+                         a.normal.dot(b.normal) > smooth && (a.point == b.point || !is_torn(a.point, b.point));
+    return std::exchange(goes_on_[facet], goes_on) != goes_on;
 }
 
 // The mean is over as much both ways as the outline goes on, so that what is linear along it stays.
-void SlidingBody::find_holds() {
-    const std::vector<Facet>& facets = body_.facets;
-    const int count = static_cast<int>(facets.size());
-    holds_.clear();
-    first_hold_.assign(1, 0);
-    for (int i = 0; i < count; ++i) {
-        const int most = static_cast<int>(0.5 * width_ / facets[i].length);
-        int low = i, high = i;
-        while (high - i < most && low > 0 && high + 1 < count && goes_on_[low - 1] && goes_on_[high]) {
-            --low;
-            ++high;
-        }
-        for (int j = low; j <= high; ++j) {
-            const Facet& f = facets[j];
-            const bool is_first = static_cast<int>(holds_.size()) == first_hold_.back();
-            if (is_first || holds_.back().point != f.point) holds_.push_back({f.point, {}});
-            for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) holds_.back().weight[k] += f.weight[k] / (high - low + 1);
-        }
-        first_hold_.push_back(static_cast<int>(holds_.size()));
+void SlidingBody::find_holds(int facet) {
+    const int most = static_cast<int>(0.5 * width_ / this->facet(facet).length);
+    int low = facet, high = facet, each = 0;
+    for (; each < most; ++each) {
+        const int before = next(low, false), after = next(high, true);
+        if (before < 0 || after < 0 || !goes_on_[before] || !goes_on_[high]) break;
+        low = before;
+        high = after;
+    }
+    std::vector<Hold>& held = holds_[facet];
+    held.clear();
+    for (int j = low, left = 2 * each + 1; left > 0; --left, j = next(j, true)) {
+        const Facet& f = this->facet(j);
+        if (held.empty() || held.back().point != f.point) held.push_back({f.point, {}});
+        for (int k = 0; k < body_.layout.nodes_per_cell(); ++k) held.back().weight[k] += f.weight[k] / (2 * each + 1);
     }
 }
 
 void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_frequency_squared) {
     search_ = SearchInterval(most_steps_between_searches);
     in_steps_ = true;
+    most_frequency_squared_ = most_frequency_squared;
+    std::vector<int> all(facets());
+    std::iota(all.begin(), all.end(), 0);
+    soften(all, mass);
+}
+
+// So that they together add no more.
+void SlidingBody::soften(const std::vector<int>& facets, const std::vector<double>& mass) {
     const Points& points = body_.points;
     const int nodes = body_.layout.nodes_per_cell();
     // What a facet adds to the stiffness of a node, at most: its row of the facet's tangent, signs aside.
@@ -157,21 +212,21 @@ void SlidingBody::limit_frequency(const std::vector<double>& mass, double most_f
             for (int k = 0; k < nodes; ++k)
                 if (hold.weight[k] != 0.0) visit(points.node[hold.point][k], stiffness_[i] * std::abs(hold.weight[k]) * sum);
     };
-    const int facets = static_cast<int>(stiffness_.size());
     std::vector<double> added(mass.size(), 0.0);
-    for (int i = 0; i < facets; ++i) for_added(i, [&](int n, double more) { added[n] += more; });
+    for (const int i : facets) for_added(i, [&](int n, double more) { added[n] += more; });
     // A facet on a node with hardly any mass must not shorten the time step.
-    for (int i = 0; i < facets; ++i) {
+    for (const int i : facets) {
         double least = 1.0;
         for_added(i, [&](int n, double) {
-            if (added[n] > most_frequency_squared * mass[n]) least = std::min(least, most_frequency_squared * mass[n] / added[n]);
+            const double most = most_frequency_squared_ * mass[n];
+            if (added[n] > most) least = std::min(least, most / added[n]);
         });
         stiffness_[i] *= least;
     }
 }
 
 Vec2 SlidingBody::current(int facet, const std::vector<Vec2>& displacement) const {
-    Vec2 x = body_.facets[facet].position;
+    Vec2 x = this->facet(facet).position;
     for (const Hold& hold : holds(facet))
         for (int k = 0; k < body_.layout.nodes_per_cell(); ++k)
             x += hold.weight[k] * displacement[body_.points.node[hold.point][k]];
@@ -197,15 +252,20 @@ void SlidingBody::find_near(const Vec2& moved, const std::vector<Vec2>& displace
     search_.has_searched((moved - searched_at_).norm() + std::abs(farthest - farthest_at_search_), may_go());
     searched_at_ = moved;
     farthest_at_search_ = farthest;
-    for (int i = 0; i < static_cast<int>(body_.facets.size()); ++i) {
-        if (!at_rest.contains(body_.facets[i].position)) continue;
+    for (int i = 0; i < facets(); ++i) {
+        if (!at_rest.contains(facet(i).position)) continue;
         const Vec2 x = current(i, displacement);
         if (!wide.contains(x)) continue;
-        if (width_ > 0.0 && !near_.empty() && near_.back() == i - 1) torn_anew |= find_joints(i - 1, i);
+        if (width_ > 0.0 && i < outline() && !near_.empty() && near_.back() == i - 1) torn_anew |= find_joint(i - 1);
         near_.push_back(i);
         if (friction_ > 0.0 && some_only && !std::binary_search(before.begin(), before.end(), i)) place_[i] = x - moved;
     }
-    if (torn_anew) find_holds();
+    for (int i = 0; i < outline() && torn_anew; ++i) find_holds(i);
+    if (width_ == 0.0) return;
+    for (const int i : near_)
+        if (is_stale_[i]) find_joint(i);
+    for (const int i : near_)
+        if (std::exchange(is_stale_[i], false)) find_holds(i);
 }
 
 Drag SlidingBody::drag_on(const Touch& touch, const Vec2& place, double depth) const {
@@ -231,7 +291,7 @@ double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displa
         const Vec2 place = current(grip.place, displacement) - moved;
         double depth = 0.0, curvature = 0.0;
         Vec2 normal = Vec2::Zero();
-        if (!depth_in(shape_, place_[grip.place], depth, normal, curvature)) continue;
+        if (!depth_at(grip.place, place_[grip.place], displacement, depth, normal, curvature)) continue;
         depth -= cut_off_[grip.place];
         if (depth <= 0.0) continue;
         // Share of the way.
@@ -264,12 +324,22 @@ void SlidingBody::restore(const std::vector<Grip>& grips, double dissipated, con
 void SlidingBody::let_yield(std::shared_ptr<LocalYield> yield) {
     if (!yield) return;
     yield_ = std::move(yield);
-    for (double& k : stiffness_) k *= LocalYield::finer;
+    for (int i = 0; i < outline(); ++i) stiffness_[i] *= LocalYield::finer;
 }
 
 double SlidingBody::sunk_at(int facet) const {
     const LocalYield::Place& place = yield_->place(facet);
     return (1.0 - place.share) * sunk_[place.station] + place.share * sunk_[place.station + 1];
+}
+
+// How deep a facet that has gone there lies in the body, before anything is cut off.
+bool SlidingBody::depth_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement, double& depth, Vec2& out,
+                           double& curvature) const {
+    if (facet < outline()) return depth_in(shape_, place, depth, out, curvature);
+    if (!inside(shape_, place)) return false;
+    const Facet& f = this->facet(facet);
+    const Vec2 into_wood = -(Polar(gradient_at(body_, f.point, displacement)).turn * f.normal);
+    return depth_in_crack(shape_, place, into_wood, depth, out, curvature);
 }
 
 // Of a facet that has gone there, against the body; below 0: so far outside [m].
@@ -344,7 +414,7 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
             depth = std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i) - cut_off_[i];
             touch.normal = arm.normalized();
             touch.curvature = 1.0 / arm.norm();
-        } else if (!depth_in(shape_, x, depth, touch.normal, touch.curvature)) {
+        } else if (!depth_at(i, x, displacement, depth, touch.normal, touch.curvature)) {
             continue;
         } else {
             depth -= cut_off_[i];

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "forward/discretisation.hpp"
+#include "forward/face_facets.hpp"
 #include "forward/friction.hpp"
 #include "forward/search_interval.hpp"
 
@@ -16,21 +16,29 @@ class LocalYield;
 /// Whether a body is a circle that no more than some cells go round, which feels each of the grid's bends.
 bool is_small_circle(const Shape& shape, const Layout& layout);
 
-/// A rigid body that pushes on the specimen's outline. Each facet inside it is pushed out along the body's normal by a force that
-/// grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where it has friction, each
-/// facet that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
+/// A rigid body that pushes on the specimen's outline and on faces of cracks. Each facet inside it is pushed out along the body's
+/// normal by a force that grows with the depth, with up to ten times the stiffness of a cell of the wood. It never pulls. Where
+/// it has friction, each facet that touches is held by a spring along the surface too, as stiff, which slips by Coulomb's law.
 ///
 /// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of
 /// a crack: displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and
 /// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
-/// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is taken for cut off.
+/// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is
+/// taken for cut off.
+///
+/// A crack that is closed ends at a body that presses on its mouth: faces feel only what comes from within the crack, the sides
+/// of a body whose normals lie within 60 degrees of the wood's own.
 class SlidingBody {
   public:
-    SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0);
+    /// `faces` must outlive this; null: none.
+    SlidingBody(const Shape& shape, const Discretisation& body, double friction = 0.0, const FaceFacets* faces = nullptr);
 
     /// Softens the springs so that they add at most `most_frequency_squared` to the highest squared frequency [1/s^2], for fields
     /// of these masses [kg]. From then on the facets that the body may touch are searched for now and then only.
     void limit_frequency(const std::vector<double>& mass, double most_frequency_squared);
+
+    /// After the faces have changed in a box; `mass` of the fields, for those whose frequency is limited [kg].
+    void take_in_faces(const Box& changed, const std::vector<double>& mass);
 
     /// From now on the wood yields by so much more than the grid, with springs as stiff for the finer cells that say so. Of
     /// circles alone.
@@ -63,9 +71,9 @@ class SlidingBody {
         int point;
         std::array<double, most_nodes> weight;
     };
-    std::span<const Hold> holds(int facet) const {
-        return {holds_.data() + first_hold_[facet], holds_.data() + first_hold_[facet + 1]};
-    }
+    /// The outline's first, then those of faces.
+    const Facet& facet(int i) const { return i < outline() ? body_.facets[i] : faces_->all()[i - outline()]; }
+    std::span<const Hold> holds(int facet) const { return holds_[facet]; }
 
     double stored_energy() const { return stored_energy_; }           // in the contact's springs at the last push [J]
     double dissipated() const { return dissipated_ + sliding_now_; }  // by friction so far, the last push included [J]
@@ -78,12 +86,20 @@ class SlidingBody {
     void restore(const std::vector<Grip>& grips, double dissipated, const Vec2& moved, const std::vector<Vec2>& displacement);
 
   private:
+    int outline() const { return static_cast<int>(body_.facets.size()); }
+    int facets() const { return outline() + (faces_ ? static_cast<int>(faces_->all().size()) : 0); }
+    void add_facets();
+    double full_stiffness(int i) const;
+    void soften(const std::vector<int>& facets, const std::vector<double>& mass);
+    bool depth_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement, double& depth, Vec2& out,
+                  double& curvature) const;
     double may_go() const;
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
     double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
     Drag drag_on(const Touch& touch, const Vec2& place, double depth) const;
-    bool find_joints(int first, int last);
-    void find_holds();
+    int next(int facet, bool forth) const;
+    bool find_joint(int facet);
+    void find_holds(int facet);
     void sink(const Vec2& moved, const std::vector<Vec2>& displacement);
     double sunk_at(int facet) const;
     double depth_of(int facet, const Vec2& place) const;
@@ -91,13 +107,15 @@ class SlidingBody {
 
     Shape shape_;
     const Discretisation& body_;
-    double width_ = 0.0;             // with whose mean a facet goes; 0: alone [m]
-    std::vector<char> goes_on_;      // [facets] whether the next one goes on smoothly where this one ends, no crack between them
-    std::vector<Hold> holds_;        // by facet
-    std::vector<int> first_hold_;    // [facets + 1]
-    std::vector<double> stiffness_;  // [facets] [N/m]
-    std::vector<double> cut_off_;    // [facets] [m]
-    std::vector<int> near_;          // facets that the body may touch before the list is made anew
+    const FaceFacets* faces_;
+    double most_frequency_squared_ = 0.0;  // 0: not limited [1/s^2]
+    double width_ = 0.0;                   // with whose mean a facet goes; 0: alone [m]
+    std::vector<char> goes_on_;  // [facets] whether the next one goes on smoothly where this one ends, no crack between them
+    std::vector<std::vector<Hold>> holds_;  // [facets]
+    std::vector<char> is_stale_;            // [facets] of faces: what holds it must be found anew before the body comes near
+    std::vector<double> stiffness_;         // [facets] [N/m]
+    std::vector<double> cut_off_;           // [facets] [m]
+    std::vector<int> near_;                 // facets that the body may touch before the list is made anew
     SearchInterval search_{1};
     Vec2 searched_at_ = Vec2::Zero();  // where the body had moved to at the last search [m]
     double farthest_at_search_ = 0.0;  // that anything of the specimen had gone then [m]

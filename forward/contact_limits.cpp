@@ -13,7 +13,7 @@ namespace crampfit {
 
 namespace {
 
-constexpr double counts_as_overlap = 0.1;  // depth of a face in a body [cells]
+constexpr double counts_as_overlap = 0.5;  // depth of a face in a body [cells]
 constexpr double beside = 0.25;            // of a crack there is wood on both sides [cells]
 constexpr double near_corner = 0.75;       // [cells]
 constexpr double deep_in_bonded = 0.25;    // [cells]
@@ -113,8 +113,8 @@ std::string beyond_contact(const Scene& scene, const Discretisation& body, const
             };
             if (std::max(depth(face.left), depth(face.right)) < counts_as_overlap * cell) continue;
             text += fmt::format(
-                "; bodies.{} has come over faces of cracks.{}, about {}, which bodies do not touch: do not trust its force, and "
-                "draw a crack that it shall open as a cutout",
+                "; bodies.{} lies over faces of cracks.{} by more than half a cell, about {}, which it has not opened: do not trust "
+                "its force",
                 rigid.name, crack, in_mm(face.at_rest));
             break;
         }

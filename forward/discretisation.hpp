@@ -152,6 +152,11 @@ struct Facet {
     std::array<double, most_nodes> weight;  // of the nodes that the point's cell sees
 };
 
+/// Facets are this part of a point's size at most: a body that rolls from one to the next then feels no step. With wheels
+/// five to twenty cells across on flanks of slope 2 (the wedge sample, 0.2 to 0.05 mm cells) the force scatters by 6 % with half a
+/// point, by 1.3 % with a quarter and by 0.7 % with an eighth.
+inline constexpr double facet_in_points = 0.125;
+
 /// Points, grid layout and shape functions: what both solvers share. In the undeformed specimen a point stays in its cell for
 /// good (total Lagrangian form; de Vaucorbeil, Nguyen and Hutchinson 2020), so the weights are those of a few places in a cell.
 class Discretisation {

@@ -59,9 +59,11 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
       gauges_(scene), history_(plan.remembers ? std::make_unique<History>(materials, body, scene.model.plane) : nullptr),
       internal_force_(body, materials, plan.rotates, history_.get()), side_by_side_(have_threads(threads)),
       factor_(body.layout.cells_x, body.layout.cells_y, threads) {
+    if (slides_on_faces(scene)) face_facets_.emplace(scene, body, cracks_);
     for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
         if (scene.bodies[b].contact.kind == Contact::Kind::bonded) continue;
-        sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient);
+        sliding_.emplace_back(scene.bodies[b].shape, body, scene.bodies[b].contact.coefficient,
+                              face_facets_ ? &*face_facets_ : nullptr);
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
     }
     do_side_by_side(side_by_side_, sliding_.size(), [&](std::size_t s) {
@@ -121,6 +123,8 @@ std::vector<CrackFields::NewField> Equilibrium::grow(int crack, bool at_end, con
     // A tip that ends, or comes near another crack, may cut a piece free.
     if (!cracks_.lines[crack].tip(at_end).inside || cracks_.lines.size() > 1) find_pieces(false);
     renumber();
+    if (face_facets_) face_facets_->take_in(changed);
+    for (SlidingBody& rigid : sliding_) rigid.take_in_faces(changed, mass_);
     body_.for_cells_in(changed, [&](int c) { factor_.mark(c); });
     return fields;
 }

@@ -226,6 +226,7 @@ class Equilibrium {
     Gauges gauges_;
     std::unique_ptr<History> history_;
     InternalForce internal_force_;
+    std::optional<FaceFacets> face_facets_;  // for bodies; nothing where there are none, or no cracks
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
 

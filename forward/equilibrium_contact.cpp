@@ -308,7 +308,7 @@ void Equilibrium::add_touch(const SlidingBody& rigid, int driver, const SlidingB
         add_rubbing(rows, steps, spread(remainder));
 
     // The factor takes up what joins the fields of one cell: all, or the same spring on the facet's own.
-    const Facet& facet = body_.facets[touch.facet];
+    const Facet& facet = rigid.facet(touch.facet);
     const auto own = points.node[facet.point];
     const bool is_all = holds.size() == 1;
     const auto& own_weight = is_all ? holds[0].weight : facet.weight;

@@ -141,7 +141,7 @@ Equilibrium::Slopes Equilibrium::slopes(const std::vector<MaterialSlope>& number
         for (std::size_t n = 0; n < numbers.size(); ++n) {
             Eigen::VectorXd forces(touches.size());
             for (std::size_t k = 0; k < touches.size(); ++k) {
-                const Facet& facet = body_.facets[touches[k].facet];
+                const Facet& facet = sliding_[s].facet(touches[k].facet);
                 const auto& constants = points.stiffness[points.cell[facet.point]];
                 const int stiffest = constants[0] >= constants[2] ? 0 : 1;
                 const double stiffer =

@@ -89,7 +89,7 @@ class ExplicitSolver {
     void list_held();
     double lag() const;
     double kinetic_energy() const;
-    void adopt(const std::vector<CrackFields::NewField>& fields, double softness);
+    void adopt(const std::vector<CrackFields::NewField>& fields, const Box& changed, double softness);
     void carry_over(const std::vector<CrackFields::Move>& moves);
     Vec2 mean_velocity_of(int driver, double from, double to) const;
     Vec2 velocity_at_end_of_step(int driver) const;
@@ -121,6 +121,7 @@ class ExplicitSolver {
     TipTies ties_;
     FaceNormals normals_;
     std::optional<BridgedFaces> bridges_;
+    std::optional<FaceFacets> face_facets_;  // for bodies; nothing where there are none, or no cracks
     std::vector<SlidingBody> sliding_;
     std::vector<int> sliding_driver_;
     std::optional<PartContact> part_contact_;

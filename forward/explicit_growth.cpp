@@ -106,7 +106,9 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     } else {
         double softness = softness_at(crack, at_end, way);
         if (materials_.homogeneous()) softness = std::clamp(softness, 1.0 / most_softness_in_one_wood, most_softness_in_one_wood);
-        adopt(cracks_.grow(crack, at_end, tip.position + way * direction), softness);
+        const Vec2 to = tip.position + way * direction;
+        const Box changed = cracks_.window(tip.position, to);
+        adopt(cracks_.grow(crack, at_end, to), changed, softness);
     }
     given -= energy();
     books_.fracture += given;

@@ -7,10 +7,11 @@
 namespace crampfit {
 
 void ExplicitSolver::place_bodies() {
+    if (slides_on_faces(scene_)) face_facets_.emplace(scene_, body_, cracks_);
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Body& rigid = scene_.bodies[b];
         if (rigid.contact.kind == Contact::Kind::bonded) continue;
-        SlidingBody sliding(rigid.shape, body_, rigid.contact.coefficient);
+        SlidingBody sliding(rigid.shape, body_, rigid.contact.coefficient, face_facets_ ? &*face_facets_ : nullptr);
         sliding.limit_frequency(mass_, plan_.added_frequency_squared);
         sliding_.push_back(std::move(sliding));
         sliding_driver_.push_back(boundary_.first_body() + static_cast<int>(b));
@@ -105,7 +106,7 @@ void ExplicitSolver::carry_over(const std::vector<CrackFields::Move>& moves) {
     }
 }
 
-void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, double softness) {
+void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, const Box& changed, double softness) {
     for (const auto& [added, from] : fields) {
         displacement_.push_back(displacement_[from]);
         velocity_.push_back(velocity_[from]);
@@ -122,6 +123,8 @@ void ExplicitSolver::adopt(const std::vector<CrackFields::NewField>& fields, dou
     ties_.take_in(cracks_, mass_, displacement_, false, softness);
     normals_.take_in(body_, cracks_, plan_.rotates);
     normals_.turn(displacement_);
+    if (face_facets_) face_facets_->take_in(changed);
+    for (SlidingBody& rigid : sliding_) rigid.take_in_faces(changed, mass_);
 }
 
 }  // namespace crampfit

@@ -9,11 +9,6 @@ namespace crampfit {
 
 namespace {
 
-// Facets are this part of a point's size at most: a body that rolls from one to the next then feels no step. With wheels
-// five to twenty cells across on flanks of slope 2 (the wedge sample, 0.2 to 0.05 mm cells) the force scatters by 6 % with half a
-// point, by 1.3 % with a quarter and by 0.7 % with an eighth.
-constexpr double facet_in_points = 0.125;
-
 // Wood is looked for this far from an outline, in cells.
 constexpr double just_beside = 1e-6;
 

@@ -24,7 +24,8 @@ bool inside_polygon(const std::vector<Vec2>& points, const Vec2& x) {
     return in;
 }
 
-OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x) {
+template <class Counts>
+OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x, const Counts& counts) {
     const double sense = signed_area(points) > 0 ? 1.0 : -1.0;
     OutlinePoint best{Vec2::Zero(), Vec2::Zero(), std::numeric_limits<double>::infinity()};
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -32,7 +33,9 @@ OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x) 
         const Vec2& b = points[(k + 1) % points.size()];
         const Vec2 on = a + nearest_on_segment(a, b, x) * (b - a);
         const double distance = (x - on).norm();
-        if (distance < best.distance) best = {on, -sense * left_of((b - a).normalized()), distance};
+        if (distance >= best.distance) continue;
+        const Vec2 normal = -sense * left_of((b - a).normalized());
+        if (counts(normal)) best = {on, normal, distance};
     }
     return best;
 }
@@ -70,7 +73,15 @@ OutlinePoint nearest_on_outline(const Shape& shape, const Vec2& x) {
         const Vec2 normal = reach > 0 ? Vec2(arm / reach) : Vec2(0.0, 1.0);
         return {circle->centre + circle->radius * normal, normal, std::abs(reach - circle->radius)};
     }
-    return nearest_on_polygon(std::get<Polygon>(shape).points, x);
+    return nearest_on_polygon(std::get<Polygon>(shape).points, x, [](const Vec2&) { return true; });
+}
+
+std::optional<OutlinePoint> nearest_facing(const Polygon& polygon, const Vec2& x, const Vec2& toward, double angle) {
+    const double least = std::cos(angle);
+    const OutlinePoint found =
+        nearest_on_polygon(polygon.points, x, [&](const Vec2& normal) { return normal.dot(toward) >= least; });
+    if (!std::isfinite(found.distance)) return std::nullopt;
+    return found;
 }
 
 std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, const Box& box) {

@@ -37,6 +37,10 @@ struct OutlinePoint {
 /// The place on a shape's outline that is nearest to x.
 OutlinePoint nearest_on_outline(const Shape& shape, const Vec2& x);
 
+/// The same of those of a polygon's sides whose normals lie within `angle` of `toward`, a unit vector; nothing where none does
+/// [rad].
+std::optional<OutlinePoint> nearest_facing(const Polygon& polygon, const Vec2& x, const Vec2& toward, double angle);
+
 /// Where along a ray from `origin` with unit `direction` it leaves the box for good; nothing when it misses the box [m].
 std::optional<double> exit_distance(const Vec2& origin, const Vec2& direction, const Box& box);
 

@@ -211,6 +211,15 @@ TEST(GradientRecord, OfAWedgeTest) {
     check("wedge", wedge_across_rings(0.4e-3), 1e-4, 1e-4);
 }
 
+TEST(GradientRecord, OfAWedgeBetweenTheFacesOfACrack) {
+    Scene scene = wedge_across_rings(0.4e-3);
+    scene.bodies[0].shape = Polygon{{{3.2e-3, 12e-3}, {5e-3, 7.05e-3}, {6.8e-3, 12e-3}}};
+    scene.bodies.erase(scene.bodies.begin() + 1);
+    scene.cracks[0].points[1] = {5e-3, 4.9e-3};
+    scene.stop.displacement = 1.6e-3;
+    check("wedge in a crack", scene, 1e-4, 1e-4);
+}
+
 TEST(SystemWalk, ThreadsChangeNoBit) {
     // Derivatives are found beside the walk; those found later, after a rest, too.
     const Scene scene = wedge_across_rings(0.4e-3);
