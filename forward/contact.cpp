@@ -43,37 +43,10 @@ constexpr double at_touch = 0.1;
 constexpr double sees_sides_within = std::numbers::pi / 3.0;
 constexpr double most_in_nearest = 3.0;
 
-// How deep x lies in the shape, which way out, and how curved. Nothing outside it.
-bool depth_in(const Shape& shape, const Vec2& x, double& depth, Vec2& out, double& curvature) {
-    curvature = 0.0;
-    if (const auto* circle = std::get_if<Circle>(&shape)) {
-        const Vec2 arm = x - circle->centre;
-        const double reach = arm.norm();
-        if (reach >= circle->radius || reach == 0.0) return false;
-        depth = circle->radius - reach;
-        out = arm / reach;
-        curvature = 1.0 / reach;
-        return true;
-    }
-    if (!inside(shape, x)) return false;
-    const OutlinePoint on = nearest_on_outline(shape, x);
-    depth = on.distance;
-    out = on.normal;
-    return true;
-}
-
-// The same of a face of a crack, with `toward` into its wood.
-bool depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward, double& depth, Vec2& out, double& curvature) {
-    if (!depth_in(shape, x, depth, out, curvature)) return false;
-    if (out.dot(toward) >= std::cos(sees_sides_within)) return true;
-    const auto* polygon = std::get_if<Polygon>(&shape);
-    if (!polygon) return false;
-    const auto side = nearest_facing(*polygon, x, toward, sees_sides_within);
-    if (!side || side->distance > most_in_nearest * depth) return false;
-    depth = side->distance;
-    out = side->normal;
-    return true;
-}
+// A corner pushes on so much of the surface on either side, evenly less away from it, where the wood lies by so much, the sine of
+// an angle, off both of its sides' normals (15 degrees).
+constexpr double corner_width_in_cells = 1.0;
+constexpr double least_to_sides = 0.26;
 
 // Of a facet with its full stiffness k, so deep in a body.
 struct Press {
@@ -105,8 +78,62 @@ bool is_small_circle(const Shape& shape, const Layout& layout) {
     return circle && circle->radius <= most_radius_in_cells * layout.cell.maxCoeff();
 }
 
+// How deep x lies in the shape; nothing outside it.
+std::optional<SlidingBody::Meeting> SlidingBody::depth_in(const Shape& shape, const Vec2& x) {
+    if (const auto* circle = std::get_if<Circle>(&shape)) {
+        const Vec2 arm = x - circle->centre;
+        const double reach = arm.norm();
+        if (reach >= circle->radius || reach == 0.0) return std::nullopt;
+        return Meeting{circle->radius - reach, arm / reach, 1.0 / reach};
+    }
+    if (!inside(shape, x)) return std::nullopt;
+    const OutlinePoint on = nearest_on_outline(shape, x);
+    return Meeting{on.distance, on.normal};
+}
+
+// The same of a face of a crack, with `toward` into its wood.
+std::optional<SlidingBody::Meeting> SlidingBody::depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward) {
+    const auto nearest = depth_in(shape, x);
+    if (!nearest || nearest->out.dot(toward) >= std::cos(sees_sides_within)) return nearest;
+    const auto* polygon = std::get_if<Polygon>(&shape);
+    if (!polygon) return std::nullopt;
+    const auto side = nearest_facing(*polygon, x, toward, sees_sides_within);
+    if (!side || side->distance > most_in_nearest * nearest->depth) return std::nullopt;
+    return Meeting{side->distance, side->normal};
+}
+
+std::vector<SlidingBody::Corner> SlidingBody::corners_of(const Shape& shape) {
+    const auto* polygon = std::get_if<Polygon>(&shape);
+    if (!polygon) return {};
+    std::vector<Vec2> points = polygon->points;
+    double area = 0.0;
+    for (std::size_t k = 0; k < points.size(); ++k) area += cross(points[k], points[(k + 1) % points.size()]);
+    if (area > 0.0) std::ranges::reverse(points);  // clockwise: the left of a side is outside
+    std::vector<Corner> corners;
+    for (std::size_t n = points.size(), k = 0; k < n; ++k) {
+        const Vec2 first = left_of(points[k] - points[(k + n - 1) % n]).normalized();
+        const Vec2 second = left_of(points[(k + 1) % n] - points[k]).normalized();
+        if (cross(second, first) > 0.0) corners.push_back({points[k], first, second});
+    }
+    return corners;
+}
+
+// The corner that pushes on a place near it whose wood lies in direction `toward`; null: none does.
+const SlidingBody::Corner* SlidingBody::corner_on(const Vec2& place, const Vec2& toward) const {
+    const auto pushes = [&](const Corner& corner) {
+        return toward.dot(corner.first + corner.second) > 0.0 &&
+               std::min(cross(toward, corner.first), cross(corner.second, toward)) > least_to_sides &&
+               std::abs(cross(corner.at - place, toward)) < corner_width();
+    };
+    const auto found = std::ranges::find_if(corners_, pushes);
+    return found == corners_.end() ? nullptr : &*found;
+}
+
+// How far along the surface a corner pushes on both sides [m].
+double SlidingBody::corner_width() const { return corner_width_in_cells * body_.layout.cell.minCoeff(); }
+
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction, const FaceFacets* faces)
-    : shape_(shape), body_(body), faces_(faces), friction_(friction) {
+    : shape_(shape), body_(body), faces_(faces), corners_(corners_of(shape)), friction_(friction) {
     if (is_small_circle(shape, body.layout))
         width_ = std::min(width_in_cells * body.layout.cell.maxCoeff(), width_in_radii * std::get<Circle>(shape).radius);
     add_facets();
@@ -289,14 +316,12 @@ double SlidingBody::taken_off(const Vec2& moved, const std::vector<Vec2>& displa
         const double held = stiffness_[grip.place] * grip.stretch;
         energy += 0.5 * held * grip.stretch;
         const Vec2 place = current(grip.place, displacement) - moved;
-        double depth = 0.0, curvature = 0.0;
-        Vec2 normal = Vec2::Zero();
-        if (!depth_at(grip.place, place_[grip.place], displacement, depth, normal, curvature)) continue;
-        depth -= cut_off_[grip.place];
+        const auto met = meeting_at(grip.place, place_[grip.place], displacement);
+        const double depth = met ? met->depth - cut_off_[grip.place] : 0.0;
         if (depth <= 0.0) continue;
         // Share of the way.
         const double touched = in_steps_ ? 1.0 : depth / (depth - std::min(0.0, depth_of(grip.place, place)));
-        energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(normal));
+        energy += 0.5 * held * touched * (place - place_[grip.place]).dot(left_of(met->out));
     }
     return energy;
 }
@@ -332,14 +357,21 @@ double SlidingBody::sunk_at(int facet) const {
     return (1.0 - place.share) * sunk_[place.station] + place.share * sunk_[place.station + 1];
 }
 
-// How deep a facet that has gone there lies in the body, before anything is cut off.
-bool SlidingBody::depth_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement, double& depth, Vec2& out,
-                           double& curvature) const {
-    if (facet < outline()) return depth_in(shape_, place, depth, out, curvature);
-    if (!inside(shape_, place)) return false;
+// Of a facet that has gone there.
+std::optional<SlidingBody::Meeting> SlidingBody::meeting_at(int facet, const Vec2& place,
+                                                            const std::vector<Vec2>& displacement) const {
     const Facet& f = this->facet(facet);
-    const Vec2 into_wood = -(Polar(gradient_at(body_, f.point, displacement)).turn * f.normal);
-    return depth_in_crack(shape_, place, into_wood, depth, out, curvature);
+    const auto toward = [&]() -> Vec2 { return -(Polar(gradient_at(body_, f.point, displacement)).turn * f.normal); };
+    if (facet >= outline()) return inside(shape_, place) ? depth_in_crack(shape_, place, toward()) : std::nullopt;
+    const auto is_near = [&](const Corner& corner) { return (corner.at - place).norm() < std::numbers::sqrt2 * corner_width(); };
+    if (std::ranges::any_of(corners_, is_near)) {
+        const Vec2 into_wood = toward();
+        if (const Corner* corner = corner_on(place, into_wood)) {
+            const Vec2 ahead = corner->at - place;
+            return Meeting{ahead.dot(into_wood), into_wood, 0.0, 1.0 - std::abs(cross(ahead, into_wood)) / corner_width()};
+        }
+    }
+    return depth_in(shape_, place);
 }
 
 // Of a facet that has gone there, against the body; below 0: so far outside [m].
@@ -407,19 +439,20 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
     std::vector<Touch> found;
     for (const int i : near_) {
         Touch touch{i, Vec2::Zero(), 0.0, 0.0, 0.0, 0.0, {}};
-        double depth = 0.0;
+        Meeting met{0.0, Vec2::Zero()};
         const Vec2 x = current(i, displacement) - moved;
         if (yield_ && yield_->holds(i)) {
             const Vec2 arm = x - std::get<Circle>(shape_).centre;
-            depth = std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i) - cut_off_[i];
-            touch.normal = arm.normalized();
-            touch.curvature = 1.0 / arm.norm();
-        } else if (!depth_at(i, x, displacement, depth, touch.normal, touch.curvature)) {
-            continue;
+            met = {std::get<Circle>(shape_).radius - arm.norm() - sunk_at(i), arm.normalized(), 1.0 / arm.norm()};
+        } else if (const auto found_here = meeting_at(i, x, displacement)) {
+            met = *found_here;
         } else {
-            depth -= cut_off_[i];
+            continue;
         }
-        const Press pressed = press(stiffness_[i], depth, onset);
+        const double depth = met.depth - cut_off_[i];
+        touch.normal = met.out;
+        touch.curvature = met.curvature;
+        const Press pressed = press(met.share * stiffness_[i], depth, onset);
         if (pressed.force <= 0.0) continue;
         touch.force = pressed.force;
         touch.stiffness = pressed.stiffness;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,9 @@ bool is_small_circle(const Shape& shape, const Layout& layout);
 /// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
 /// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is
 /// taken for cut off.
+///
+/// A convex corner of a polygon pushes against the wood's own normal, on the surface within a cell of it, where that lies well
+/// between the normals of the corner's sides: else wood that gives way on either side of a sharp edge would be pinched by them.
 ///
 /// A crack that is closed ends at a body that presses on its mouth: faces feel only what comes from within the crack, the sides
 /// of a body whose normals lie within 60 degrees of the wood's own.
@@ -91,8 +95,22 @@ class SlidingBody {
     void add_facets();
     double full_stiffness(int i) const;
     void soften(const std::vector<int>& facets, const std::vector<double>& mass);
-    bool depth_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement, double& depth, Vec2& out,
-                  double& curvature) const;
+    struct Meeting {
+        double depth;            // of a place in the body, before anything is cut off [m]
+        Vec2 out;                // unit, the way out of the body
+        double curvature = 0.0;  // of the surfaces of equal depth there, 1 / radius [1/m]
+        double share = 1.0;      // of the facet's stiffness
+    };
+    struct Corner {
+        Vec2 at;             // [m]
+        Vec2 first, second;  // out of its sides, the first a turn counter-clockwise of less than half from the second
+    };
+    static std::optional<Meeting> depth_in(const Shape& shape, const Vec2& x);
+    static std::optional<Meeting> depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward);
+    static std::vector<Corner> corners_of(const Shape& shape);
+    double corner_width() const;
+    const Corner* corner_on(const Vec2& place, const Vec2& toward) const;
+    std::optional<Meeting> meeting_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement) const;
     double may_go() const;
     void find_near(const Vec2& moved, const std::vector<Vec2>& displacement);
     double taken_off(const Vec2& moved, const std::vector<Vec2>& displacement) const;
@@ -108,6 +126,7 @@ class SlidingBody {
     Shape shape_;
     const Discretisation& body_;
     const FaceFacets* faces_;
+    std::vector<Corner> corners_;
     double most_frequency_squared_ = 0.0;  // 0: not limited [1/s^2]
     double width_ = 0.0;                   // with whose mean a facet goes; 0: alone [m]
     std::vector<char> goes_on_;  // [facets] whether the next one goes on smoothly where this one ends, no crack between them

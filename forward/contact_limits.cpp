@@ -15,10 +15,7 @@ namespace {
 
 constexpr double counts_as_overlap = 0.5;  // depth of a face in a body [cells]
 constexpr double beside = 0.25;            // of a crack there is wood on both sides [cells]
-constexpr double near_corner = 0.75;       // [cells]
 constexpr double deep_in_bonded = 0.25;    // [cells]
-constexpr double hair = 1e-6;              // of a side
-constexpr double least_to_sides = 0.26;    // sine of the angle from a corner's sides to the wood that lies about it [15 degrees]
 
 // A place on a crack with wood on both sides, as they lie now.
 struct Face {
@@ -59,31 +56,6 @@ Vec2 place_of(const Facet& facet, const Discretisation& body, const std::vector<
     return x;
 }
 
-// A convex corner of a polygon that presses on wood whose own normal lies well between those of the corner's sides.
-bool presses_on(const std::vector<Vec2>& corners, std::size_t k, const Shape& shape, const Discretisation& body,
-                const std::vector<Vec2>& displacement, const Vec2& moved) {
-    const std::size_t n = corners.size();
-    const Vec2 before = corners[k] - corners[(k + n - 1) % n], after = corners[(k + 1) % n] - corners[k];
-    const auto out_of = [&](const Vec2& side, const Vec2& middle) -> Vec2 {
-        const Vec2 normal = left_of(side).normalized();
-        return inside(shape, middle + hair * side.norm() * normal) ? -normal : normal;
-    };
-    const Vec2 first = out_of(before, corners[k] - 0.5 * before), second = out_of(after, corners[k] + 0.5 * after);
-    if (inside(shape, corners[k] + hair * std::min(before.norm(), after.norm()) * (first + second).normalized())) return false;
-    // Which way round from the first normal to the second.
-    const auto cross = [](const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); };
-    const double way = cross(first, second) > 0.0 ? 1.0 : -1.0;
-    const double cell = body.layout.cell.minCoeff();
-    for (const Facet& facet : body.facets) {
-        const Vec2 x = place_of(facet, body, displacement) - moved;
-        if ((x - corners[k]).norm() > near_corner * cell || !inside(shape, x)) continue;
-        const Vec2 toward = -(Polar(gradient_at(body, facet.point, displacement)).turn * facet.normal);
-        const double to_sides = std::min(way * cross(first, toward), way * cross(toward, second));
-        if (toward.dot(first + second) > 0.0 && to_sides > least_to_sides) return true;
-    }
-    return false;
-}
-
 }  // namespace
 
 std::string beyond_contact(const Scene& scene, const Discretisation& body, const CrackFields& cracks,
@@ -112,19 +84,10 @@ std::string beyond_contact(const Scene& scene, const Discretisation& body, const
                 return inside(rigid.shape, there) ? nearest_on_outline(rigid.shape, there).distance : 0.0;
             };
             if (std::max(depth(face.left), depth(face.right)) < counts_as_overlap * cell) continue;
-            text += fmt::format(
-                "; bodies.{} lies over faces of cracks.{} by more than half a cell, about {}, which it has not opened: do not trust "
-                "its force",
-                rigid.name, crack, in_mm(face.at_rest));
-            break;
-        }
-        const auto* polygon = std::get_if<Polygon>(&rigid.shape);
-        for (std::size_t k = 0; polygon && k < polygon->points.size(); ++k) {
-            if (!presses_on(polygon->points, k, rigid.shape, body, displacement, moved[b])) continue;
-            text +=
-                fmt::format("; a sharp corner of bodies.{} presses on the wood, about {}: the grid cannot tell which way, do not "
-                            "trust its force, and round it by two cells",
-                            rigid.name, in_mm(polygon->points[k] + moved[b]));
+            text += fmt::format("; bodies.{} lies over faces of cracks.{} by more than half a cell, about {}, which it has not "
+                                "opened: do not trust "
+                                "its force",
+                                rigid.name, crack, in_mm(face.at_rest));
             break;
         }
     }

@@ -237,4 +237,22 @@ double Station::critical_time(double toughness, bool beyond) const {
     return found <= still_from * (1.0 + 1e-12) ? found : never;
 }
 
+double Station::share_of_critical(double toughness, double time) const {
+    const std::size_t tip = 2 * moving.front().crack + moving.front().at_end;
+    std::vector<double> times, shares;
+    for (const auto& [number, state] : states) {
+        const auto further = ahead.find(number);
+        const double G = route_length() > 0.0 && further != ahead.end()
+                             ? (state.potential - further->second[0]) / (route_length() * thickness)
+                             : state.tips[tip].G;
+        times.push_back(state.time);
+        shares.push_back(std::sqrt(std::max(0.0, G) / toughness));
+    }
+    const double t = std::min(time, still_from);
+    if (times.empty() || t <= times.front()) return times.empty() || times[0] == 0.0 ? 0.0 : shares[0] * t / times[0];
+    const auto next = std::ranges::upper_bound(times, t) - times.begin();
+    if (next == static_cast<std::ptrdiff_t>(times.size())) return shares.back();
+    return std::lerp(shares[next - 1], shares[next], (t - times[next - 1]) / (times[next] - times[next - 1]));
+}
+
 }  // namespace crampfit

@@ -70,6 +70,10 @@ struct Station {
     /// [J/m^2], between what is known; infinite where it does not within that [s]. `beyond` it: the energy released goes on as a
     /// power of the time.
     double critical_time(double toughness, bool beyond = false) const;
+
+    /// How far the load is on its way to there at a time: the root of what the next advance releases over what it costs, which
+    /// goes evenly with the load. Where what lies ahead is not known, of G at the tip.
+    double share_of_critical(double toughness, double time) const;
 };
 
 /// Mean toughness of the wood along a route; of one place, at it [J/m^2].

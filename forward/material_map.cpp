@@ -40,6 +40,19 @@ Vec2 steepest(const std::vector<Eigen::Matrix3d>& value, int side) {
     return first_axis(tensor);
 }
 
+// Where in a rectangle a sample lies, -1 .. 1: one in each of `side` x `side` tiles, row by row, none of whose neighbours in a
+// row or column of a quarter lies on a line of the grid with it, and mirror images of one another. In the middles of the tiles a
+// boundary along the grid would be seen to half a tile only, and all bands of rings that fit the grid would be wrong alike.
+Vec2 place_of_sample(int k, int side) {
+    const auto along = [&](int tile, int other) {
+        const int steps = (side + 1) / 2;  // of the other's rows up to the middle
+        const double step = (std::min(other, side - 1 - other) + 0.5) / steps - 0.5;
+        const int half = 2 * tile + 1 < side ? 1 : 2 * tile + 1 > side ? -1 : 0;
+        return (2.0 * (tile + half * step) + 1.0) / side - 1.0;
+    };
+    return {along(k % side, k / side), along(k / side, k % side)};
+}
+
 // Places in different parts differ by rounding: by less than this power of two, of half a rectangle.
 constexpr int same_place = -36;
 
@@ -346,7 +359,8 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
     return first_axis(tensor);
 }
 
-// Sixteen samples a side see a boundary's place to 1/32 of the area's width; a picture is seen at twice its own resolution.
+// Sixteen samples a side see the place of a boundary along the grid to 1/256 of the area's width (`place_of_sample`); a picture
+// is seen at twice its own resolution.
 int MaterialMap::samples_a_side(const Vec2& half) const {
     // One more sample than twice a whole number of pixels would put some of them on the edges of pixels.
     constexpr double rounding = 1e-6;
@@ -365,7 +379,7 @@ std::vector<double> MaterialMap::shares(const Vec2& middle, const Vec2& half) co
     const int samples = samples_a_side(half);
     double filled = 0.0;
     for (int k = 0; k < samples * samples; ++k) {
-        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const Vec2 place = place_of_sample(k, samples);
         const LocalWood here = wood_of(sample_at(centre + place.cwiseProduct(half)));
         if (here.filled == 0.0) continue;
         shares[here.material] += 1.0;
@@ -403,7 +417,7 @@ int MaterialMap::sample(WoodArea& area) const {
     if (!area.samples.empty()) return side;
     area.samples.reserve(side * side);
     for (int k = 0; k < side * side; ++k) {
-        const Vec2 place((2.0 * (k % side) + 1.0) / side - 1.0, (2.0 * (k / side) + 1.0) / side - 1.0);
+        const Vec2 place = place_of_sample(k, side);
         area.samples.push_back(sample_at(area.centre + place.cwiseProduct(area.half)));
     }
     return side;
@@ -466,7 +480,7 @@ Unevenness MaterialMap::find_unevenness(WoodArea& area, const LocalWood& average
     Eigen::Vector3d second = Eigen::Vector3d::Zero(), seconds = Eigen::Vector3d::Zero();  // means of E' and 1, times xx, xy, yy
     const double share = 1.0 / (samples * samples);
     for (int k = 0; k < samples * samples; ++k) {
-        const Vec2 place((2.0 * (k % samples) + 1.0) / samples - 1.0, (2.0 * (k / samples) + 1.0) / samples - 1.0);
+        const Vec2 place = place_of_sample(k, samples);
         const LocalWood here = wood_of(area.samples[k]);
         const Coefficients wood =
             orthotropic_ ? layered(here.elasticity.stiffness(), normal).coefficients : here.elasticity.coefficients;

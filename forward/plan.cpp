@@ -407,7 +407,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     const bool chosen = scene.solver.strain != StrainMeasure::automatic;
     plan.rotates = chosen ? scene.solver.strain == StrainMeasure::finite_rotation : expected > bound * smallest;
     plan.may_turn = !plan.rotates && (plan.grows || has_dead_load(scene) || expected > bound * smallest);
-    plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && !plan.remembers && travel.stops.empty();
+    // Under a load that goes and another that stays faces of cracks may come together or part.
+    const bool faces_may_change = !scene.cracks.empty() && plan.driven && has_dead_load(scene);
+    plan.linear = plan.quasistatic && !plan.rotates && !plan.contact && !plan.friction && !plan.remembers &&
+                  travel.stops.empty() && !faces_may_change;
     if (plan.quasistatic && !plan.linear && (plan.driven || plan.remembers) && !std::isfinite(plan.end_time))
         refuse(scene, "stop", "crack_length alone",
                "equilibrium that is not linear needs a time, or a displacement that is driven, to know how far "

@@ -73,6 +73,9 @@ class Quasistatic {
     /// What a station is like at a time; at the last one that is known before it where an equilibrium is missing.
     LoadState at(std::size_t station, double time);
 
+    /// Whether an equilibrium of a station is known at a time, or found.
+    bool can_stand(std::size_t station, double time);
+
     /// What the scene's probes read there then [readings] [m]; empty where there is no equilibrium.
     std::vector<Vec2> probes_at(std::size_t station, double time);
 

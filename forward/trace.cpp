@@ -139,7 +139,8 @@ class Tracer {
                 const double until = std::isfinite(end_time()) ? end_time() : plan_.still_from;
                 if (std::isfinite(until)) {
                     if (!std::isfinite(sample_)) sample_ = until / scene_.output.samples;
-                    stand(i, here, std::max(now, until));
+                    if (i == 0) stand(0, here, until);
+                    else stop_between(i, here, std::max(now, until));
                 } else if (i > 0) {
                     jump(i, now, here);
                 }
@@ -308,6 +309,37 @@ class Tracer {
             if (to.load.time < time) return;
         }
         if (!done_ && until > from.load.time) go(from, moment(i, until));
+    }
+
+    // The load ends or is taken back before it is due to go on from a station, to which the crack is on its way.
+    void stop_between(std::size_t i, Moment from, double until) {
+        const auto grown = [&](const std::vector<double>& lengths) {
+            double sum = 0.0;
+            for (std::size_t k = 0; k < lengths.size(); ++k) sum += lengths[k] - walk_.station(i - 1).lengths[k];
+            return sum;
+        };
+        const double whole = grown(walk_.station(i).lengths), start = from.load.time;
+        const double share_before = whole > 0.0 ? std::clamp(grown(from.lengths) / whole, 0.0, 1.0) : 1.0;
+        const auto load = [&](double time) {
+            if (std::isfinite(critical_[i])) return time / critical_[i];
+            return toughness_[i] > 0.0 ? walk_.station(i).share_of_critical(toughness_[i], time) : 1.0;
+        };
+        const double load_before = load(start);
+        double share = share_before;
+        const auto at = [&](double time) {
+            if (const double left = 1.0 - load_before; left > 0.0)
+                share = std::max(share, std::lerp(share_before, 1.0, std::clamp((load(time) - load_before) / left, 0.0, 1.0)));
+            else share = 1.0;
+            const Moment whole_way = moment(i, time);
+            return share < 1.0 && walk_.can_stand(i - 1, time) ? mixed(moment(i - 1, time), whole_way, share) : whole_way;
+        };
+        for (double time = next_sample(start); time < until - rounding * sample_ && !done_; time = next_sample(time)) {
+            const Moment to = at(time);
+            go(from, to);
+            from = to;
+            if (to.load.time < time) return;
+        }
+        if (!done_ && until > from.load.time) go(from, at(until));
     }
 
     // There is one where some or all motion ends: the load's power goes in a step there.

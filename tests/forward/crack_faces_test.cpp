@@ -79,6 +79,59 @@ TEST(UnitCrackFaces, ThatStickCarryShearWhilePressed) {
     }
 }
 
+TEST(VerificationCrackFaces, MayPartUnderALoadThatStaysAndAnotherThatGoes) {
+    // A traction closes an edge crack, and the other half of the side is drawn up: what that does is stored, and at a time the
+    // same whenever the run ends.
+    double before = 0.0;
+    for (const double end : {0.3, 1.0}) {
+        Scene scene = at_equilibrium(block({20e-3, 20e-3}, 1e-3));
+        Edge pressed = moving("pressed", Side::top, {});
+        pressed.velocity = {};
+        pressed.traction = Vec2(0.0, -0.5e6);
+        pressed.range = {{0.0, 10e-3}};
+        Edge drawn = moving("drawn", Side::top, {0.0, 1e-3});
+        drawn.range = {{10e-3, 20e-3}};
+        scene.edges = {pressed, drawn, moving("bottom", Side::bottom, {0.0, 0.0})};
+        Crack crack;
+        crack.points = {Vec2(0.0, 10e-3), Vec2(8e-3, 10e-3)};
+        scene.cracks = {crack};
+        scene.measure = {"drawn", "drawn"};
+        scene.solver.strain = StrainMeasure::small;
+        scene.stop.time = end;
+        scene.output.samples = 60;
+        const Record record = simulate(scene);
+        const auto row = std::ranges::min_element(record.series, {}, [](const Instant& r) { return std::abs(r.time - 0.2); });
+        std::printf("until %.1f s: G %.3f J/m^2 at %.2f s, work %.5f mJ, strain energy %.5f mJ\n", end, row->G, row->time,
+                    1e3 * row->external_work, 1e3 * row->strain_energy);
+        EXPECT_NEAR(row->strain_energy, row->external_work, 1e-3 * row->external_work);
+        EXPECT_NEAR(row->G, before > 0.0 ? before : row->G, 0.01 * row->G);
+        before = row->G;
+    }
+}
+
+TEST(UnitCrackFaces, ThatHaveStuckLetGoWhereTheyAreDrawnApart) {
+    // Pressed and sheared, then drawn apart: what they held by sticking is released.
+    double G[2];
+    for (const auto kind : {CrackFaces::Kind::stick, CrackFaces::Kind::frictionless}) {
+        Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.5e-3));
+        scene.edges = {moving("top", Side::top, {0.05e-3, -0.1e-3}), moving("bottom", Side::bottom, {0.0, -0.05e-3})};
+        scene.edges[0].until = 1.0;
+        scene.edges[1].until = 4.0;
+        Crack crack;
+        crack.points = {Vec2(3e-3, 5e-3), Vec2(7e-3, 5e-3)};
+        crack.faces.kind = kind;
+        scene.cracks = {crack};
+        scene.measure = {"top", "top"};
+        scene.stop.time = 4.0;
+        scene.output.samples = 50;
+        const Record record = simulate(scene);
+        ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+        G[kind == CrackFaces::Kind::stick] = record.series.back().G;
+    }
+    EXPECT_GT(G[0], 0.0);
+    EXPECT_NEAR(G[1], G[0], 1e-3 * G[0]);
+}
+
 // A block with a crack whose faces have gone through each other here and past each other everywhere, turned as a whole.
 struct TurnedBlock {
     TurnedBlock(CrackFaces::Kind faces, double angle, double far = 0.02e-3, double modulus = 40e6)

@@ -362,6 +362,32 @@ TEST(UnitWalk, StopsAreMetExactly) {
     }
 }
 
+TEST(UnitWalk, WhereTheLoadEndsOrIsHeldTheCrackIsWhereItWouldBeHadItGoneOn) {
+    const Scene scene = cantilevers(1e-3);
+    const Record whole = simulate(scene);
+    const double until = 0.7 * whole.series.back().time, u = mm_per_minute * until;
+    const auto after = std::ranges::find_if(whole.series, [&](const Instant& row) { return row.time > until; });
+    const Instant &low = *std::prev(after), &high = *after;
+    const double s = (until - low.time) / (high.time - low.time);
+    const double length = std::lerp(low.crack_length, high.crack_length, s), force = std::lerp(low.force, high.force, s);
+    for (const bool holds : {false, true})
+        for (const bool rotates : {false, true}) {
+            Scene other = scene;
+            other.solver.strain = rotates ? StrainMeasure::finite_rotation : StrainMeasure::small;
+            other.stop = {};
+            if (holds)
+                for (Edge& edge : other.edges) edge.until = until;
+            if (holds) other.stop.time = 1.2 * until;
+            else other.stop.displacement = u;
+            const Record record = simulate(other);
+            const Instant& last = record.series.back();
+            EXPECT_EQ(record.status, RunStatus::finished);
+            EXPECT_NEAR(last.displacement, u, 1e-6 * u);
+            EXPECT_NEAR(last.crack_length, length, 0.03e-3) << holds << rotates;  // of a station of 0.5 mm
+            EXPECT_NEAR(last.force, force, 3e-3 * force) << holds << rotates;
+        }
+}
+
 TEST(UnitWalk, ACrackLengthAloneStopsIt) {
     // Nothing bounds the loading then: it goes on until the crack is that long. By edges in a linear scene; one by grips, which
     // is not linear since nothing says beforehand how far they will go, is refused.

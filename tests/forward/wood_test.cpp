@@ -154,6 +154,20 @@ TEST(UnitRings, BandsKeepTheirWidthOnAnyGrid) {
     EXPECT_NEAR(share[0], share[1], 0.003);
 }
 
+TEST(UnitRings, BandsAlongTheGridKeepTheirShareWhereverTheyLie) {
+    // Bands of 2.6 cells whose period is ten: each lies in the same place of its cells.
+    for (const double offset : {0.0, 0.03e-3, 0.07e-3, 0.11e-3, 0.16e-3}) {
+        Scene scene = ringed(0.0);
+        const double far = 1e3;
+        scene.model.cell = 0.2e-3;
+        scene.specimen.rings = Rings{Vec2(-far + offset, 5e-3), 2e-3, 0.26, 0.0};
+        const MaterialMap map(scene);
+        const Discretisation body(scene, map);
+        const double share = std::accumulate(body.points.latewood.begin(), body.points.latewood.end(), 0.0) / body.points.count();
+        EXPECT_NEAR(share, 0.26, 0.26 * 0.01) << offset;
+    }
+}
+
 TEST(UnitLayout, FitsTheSpecimenAndLeavesOutCutouts) {
     Scene scene = block({10e-3, 5e-3}, 0.12e-3);
     scene.specimen.cutouts = {Circle{Vec2(5e-3, 2.5e-3), 1e-3}};
