@@ -127,27 +127,45 @@ class Sampler {
     long accepted_ = 0;
 };
 
-// Integrated autocorrelation time of the ensemble's mean, over the window that is five times as long: Goodman and Weare (2010),
-// section 3, after Sokal.
-double correlation_time(const std::vector<double>& means) {
-    const std::size_t n = means.size();
-    double mean = 0;
-    for (const double value : means) {
-        mean += value / static_cast<double>(n);
-    }
+// Integrated autocorrelation time of series of which all have one mean, over the window that is five times as long: Goodman and
+// Weare (2010), section 3, after Sokal. `variance`: of each.
+double correlation_time(const std::vector<std::vector<double>>& series, double mean, double variance) {
+    const std::size_t n = series.front().size();
     const auto covariance = [&](std::size_t lag) {
         double sum = 0;
-        for (std::size_t i = 0; i + lag < n; ++i) {
-            sum += (means[i] - mean) * (means[i + lag] - mean);
+        for (const std::vector<double>& values : series) {
+            for (std::size_t i = 0; i + lag < n; ++i) {
+                sum += (values[i] - mean) * (values[i + lag] - mean);
+            }
         }
-        return sum / static_cast<double>(n);
+        return sum / static_cast<double>(series.size() * (n - lag));
     };
-    const double variance = covariance(0);
     double time = 1;
     for (std::size_t lag = 1; variance > 0 && lag < n && static_cast<double>(lag) < 5 * time; ++lag) {
         time += 2 * covariance(lag) / variance;
     }
     return std::max(1.0, time);
+}
+
+// Of the mean of all walkers, [walkers][sweeps]. A chain that is short against it shows too little of it by that mean, which
+// hardly moves, and enough by the walkers one by one, which do not know how they follow each other: the longer of both.
+double correlation_time(const std::vector<std::vector<double>>& walkers) {
+    const auto count = static_cast<double>(walkers.size());
+    const std::size_t n = walkers.front().size();
+    std::vector<double> means(n, 0.0);
+    double mean = 0, variance = 0;
+    for (const std::vector<double>& values : walkers) {
+        for (std::size_t i = 0; i < n; ++i) {
+            means[i] += values[i] / count;
+            mean += values[i] / (count * static_cast<double>(n));
+        }
+    }
+    for (const std::vector<double>& values : walkers) {
+        for (const double value : values) {
+            variance += (value - mean) * (value - mean) / (count * static_cast<double>(n));
+        }
+    }
+    return std::max(correlation_time({means}, mean, variance / count), correlation_time(walkers, mean, variance));
 }
 
 }  // namespace
@@ -160,28 +178,29 @@ Ensemble draw_ensemble(Objective& objective, const std::function<double(const Ev
     const int left_out = std::max(50, sweeps / 3);
     Sampler sampler(objective, log_likelihood, seed);
     Ensemble ensemble;
-    std::vector<std::vector<double>> means(static_cast<std::size_t>(p));
+    std::vector<std::vector<std::vector<double>>> drawn(  // [parameters][walkers][sweeps]
+        static_cast<std::size_t>(p), std::vector<std::vector<double>>(static_cast<std::size_t>(walkers)));
     bool goes_on = sampler.begin(centre, covariance, walkers);
     for (int i = 0; i < left_out + sweeps && goes_on; ++i) {
         goes_on = sampler.sweep();
         if (i < left_out || !goes_on) {
             continue;
         }
-        Eigen::VectorXd mean = Eigen::VectorXd::Zero(p);
-        for (const Walker& walker : sampler.walkers()) {
-            mean += walker.run.x / walkers;
+        for (std::size_t k = 0; k < sampler.walkers().size(); ++k) {
+            const Walker& walker = sampler.walkers()[k];
+            for (int j = 0; j < p; ++j) {
+                drawn[static_cast<std::size_t>(j)][k].push_back(walker.run.x[j]);
+            }
             if (static_cast<int>(ensemble.samples.size()) < samples && walker.run.evaluation->usable()) {
                 ensemble.samples.push_back(walker.run);
             }
         }
-        for (int j = 0; j < p; ++j) {
-            means[static_cast<std::size_t>(j)].push_back(mean[j]);
-        }
     }
     ensemble.acceptance = sampler.acceptance();
+    ensemble.sweeps = static_cast<int>(drawn.front().front().size());
     ensemble.correlation_time.resize(p);
     for (int j = 0; j < p; ++j) {
-        ensemble.correlation_time[j] = correlation_time(means[static_cast<std::size_t>(j)]);
+        ensemble.correlation_time[j] = correlation_time(drawn[static_cast<std::size_t>(j)]);
     }
     return ensemble;
 }

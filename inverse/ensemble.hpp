@@ -13,6 +13,7 @@ namespace crampfit {
 struct Ensemble {
     std::vector<Run> samples;          // in the order drawn, after what was left out at the begin
     double acceptance = 0;             // part of the moves that were made
+    int sweeps = 0;                    // over all walkers, without what was left out
     Eigen::VectorXd correlation_time;  // of each parameter along the chain, in sweeps over all walkers [parameters]
 };
 

@@ -13,6 +13,7 @@ namespace crampfit {
 namespace {
 
 constexpr int runs_of_a_profile = 5000;
+constexpr double long_chain = 50;     // in correlation times: as the authors of emcee advise (Foreman-Mackey et al. 2013)
 constexpr int runs_for_a_sample = 4;  // those left out at the begin and moves that are not made included
 
 // Stands for the model where runs are dear: polynomials of the residuals over the runs about the best one, as wide as the
@@ -101,6 +102,13 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
             "each parameter's scale but for priors. ",
             result.posterior.samples.size(), static_cast<double>(result.posterior.samples.size()) / time,
             100 * result.posterior.acceptance);
+        if (result.posterior.sweeps < long_chain * time) {
+            result.message +=
+                fmt::format("So short a chain shows that roughly: its correlation time is {:.0f} of {} sweeps; {:.0f} "
+                            "samples would show it well. ",
+                            time, result.posterior.sweeps,
+                            static_cast<double>(choice.posterior) * long_chain * time / result.posterior.sweeps);
+        }
     }
     return result;
 }

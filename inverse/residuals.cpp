@@ -180,10 +180,13 @@ double place_error(const Curve& rows, double at, double half, double sigma) {
     return shift_error(mean_at, at, sigma, rows.x().front() + half, rows.x().back() - half);
 }
 
+// Of the middle one of three rows each: one row alone does not make it.
 double largest(const Curve& rows) {
+    const std::vector<double>& y = rows.y();
     double most = 0;
-    for (const double value : rows.y()) {
-        most = std::max(most, std::abs(value));
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        const double before = y[i > 0 ? i - 1 : i], after = y[i + 1 < y.size() ? i + 1 : i];
+        most = std::max(most, std::abs(std::max(std::min(before, after), std::min(std::max(before, after), y[i]))));
     }
     return most;
 }
@@ -347,6 +350,22 @@ void Comparison::tell_of_hold(const Experiment& experiment) {
     }
 }
 
+// A force that goes up or down for one row alone, by more than any other row is: hardly a test's, and it speaks for all of a
+// window.
+void Comparison::tell_of_spikes(const Experiment& experiment, const Curve& rows) {
+    constexpr double plain = 0.5;  // of the highest force
+    const std::vector<double>& y = rows.y();
+    for (std::size_t i = 1; i + 1 < y.size(); ++i) {
+        const double off = y[i] - 0.5 * (y[i - 1] + y[i + 1]);
+        if (std::abs(off) > plain * peak_force_ && std::abs(y[i + 1] - y[i - 1]) < 0.1 * std::abs(off)) {
+            remarks_.push_back(fmt::format(
+                "{}: one row alone, at {:.4g} {}, reads {:.4g} N, and those beside it {:.4g} and {:.4g} "
+                "N; leave it out if the load cell did not mean it.",
+                experiment.name, (by_time_ ? 1.0 : 1e3) * rows.x()[i], by_time_ ? "s" : "mm", y[i], y[i - 1], y[i + 1]));
+        }
+    }
+}
+
 // Rows of a hold count as those of another place do.
 void Comparison::count_hold(Curve& rows) const {
     if (may_relax_) {
@@ -380,6 +399,7 @@ void Comparison::add_force_stations(const Experiment& experiment) {
     rows.level_steps(noise);
     count_hold(rows);
     peak_force_ = largest(rows);
+    tell_of_spikes(experiment, rows);
     const double from = rows.x().front(), to = rows.x().back();
     const int tiles = static_cast<int>(std::lround(1 / smoothing_window));
     const double usual = std::max(noise * rows.usual_error(), usual_step(rows));

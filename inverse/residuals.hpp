@@ -79,6 +79,7 @@ class Comparison {
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
     void tell_of_hold(const Experiment& experiment);
+    void tell_of_spikes(const Experiment& experiment, const Curve& rows);
     void count_hold(Curve& rows) const;
     double sigma(std::size_t station, double model_resolution) const;
     double noise_of(const Experiment& experiment, const char* what, const Curve& rows, const std::optional<double>& given);

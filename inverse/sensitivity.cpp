@@ -47,6 +47,10 @@ class Indices {
 };
 
 // One output's values at all points; not a number where it could not be had.
+// Part of the runs that may lack an output: others are left out, and what is left of the box is none, where Sobol's indices are
+// of parameters that vary independently.
+constexpr double most_lacking = 0.01;
+
 std::vector<double> values_of(const Evaluations& evaluations, std::size_t output) {
     std::vector<double> values;
     for (const auto& evaluation : evaluations) {
@@ -156,7 +160,14 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
     }
     case SensitivityMethod::sobol: {
         const SaltelliDesign design(box.size(), samples > 0 ? samples : default_rows, seed);
-        for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
+        for_each_output(design.points(), [&](std::size_t k, std::vector<double> values) {
+            const double failed = static_cast<double>(std::ranges::count_if(
+                objective.at(design.points()), [](const auto& evaluation) { return !evaluation || !evaluation->usable(); }));
+            const double none =
+                static_cast<double>(std::ranges::count_if(values, [](double value) { return std::isnan(value); }));
+            if (none - failed > most_lacking * (static_cast<double>(values.size()) - failed)) {
+                std::ranges::fill(values, std::numeric_limits<double>::quiet_NaN());
+            }
             const SaltelliDesign::Indices of_output = design.indices(values);
             indices.add(k, "first", of_output.first);
             indices.add(k, "total", of_output.total);
@@ -209,7 +220,7 @@ void fill_runs(const UnitBox& box, const std::vector<Run>& runs, Sensitivity& re
 }
 
 // Failed runs and outputs that some runs do not have, counted.
-void conclude(const std::vector<Run>& runs, bool stopped, Sensitivity& result) {
+void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopped, Sensitivity& result) {
     const auto failed = std::count_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
     const auto good = static_cast<std::ptrdiff_t>(runs.size()) - failed;
     const bool told = std::ranges::any_of(result.indices, [](const SensitivityIndex& index) { return !std::isnan(index.value); });
@@ -225,7 +236,13 @@ void conclude(const std::vector<Run>& runs, bool stopped, Sensitivity& result) {
                                            [&](const SensitivityRun& run) { return std::isnan(run.outputs[k]); }) -
                              failed;
         if (without > 0) {
-            result.message += fmt::format("; {} runs have no '{}' and are left out there", without, result.outputs[k].name);
+            const bool no_box =
+                method == SensitivityMethod::sobol && static_cast<double>(without) > most_lacking * static_cast<double>(good);
+            result.message +=
+                fmt::format("; {} runs have no '{}' {}", without, result.outputs[k].name,
+                            no_box ? "and without them parameters are not independent any more: no Sobol indices of it; "
+                                     "narrow the box, or choose an output that all runs have"
+                                   : "and are left out there");
         }
     }
 }
@@ -282,7 +299,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
         });
     apply_method(study, model.box(), objective, slopes, options.seed, result);
     fill_runs(model.box(), objective.runs(), result);
-    conclude(objective.runs(), objective.stopped(), result);
+    conclude(objective.runs(), study.sensitivity.method, objective.stopped(), result);
     if (slopes && !result.indices.empty() && study.sensitivity.method == SensitivityMethod::local) {
         result.message += "; derivatives are exact, by the solver";
     }
