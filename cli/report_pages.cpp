@@ -3,6 +3,7 @@
 #include "cli/html.hpp"
 #include "datasets/error.hpp"
 #include "datasets/toml_reader.hpp"
+#include "inverse/run_store.hpp"
 
 #include <fmt/format.h>
 
@@ -30,7 +31,8 @@ std::string repeat_section(const std::string& toml, const std::string& verb, con
                    paragraph(fmt::format("Save the text below as {}, with the files that it names beside it; it holds what --set "
                                          "changed in it. The result was written by crampfit {}.",
                                          input, origin.version)) +
-                       verbatim(fmt::format("crampfit {} {}{} -o {}", verb, input, settings, origin.file.filename().string())) +
+                       verbatim(fmt::format("crampfit {} {}{} -o {}", verb, input, settings,
+                                            quoted_for_shell(origin.file.filename().string()))) +
                        verbatim(toml));
 }
 

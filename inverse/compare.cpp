@@ -110,8 +110,22 @@ Fit fit_models(const Study& study, const FitOptions& options) {
             second.aic - first.aic > plain
                 ? "{0} \"{1}\" explains the data best, with {2:.2g} of the evidence; next \"{3}\" with {4:.2g}. {5}"
                 : "The data do not tell {0} \"{1}\" from \"{3}\": {2:.2g} and {4:.2g} of the evidence. {5}";
-        best.message = fmt::format(fmt::runtime(verdict), study.compared_key, first.name, first.weight, second.name,
-                                   second.weight, best.message);
+        std::string failed;
+        for (const ComparedModel& model : models) {
+            if (!std::isfinite(model.aic)) {
+                failed += fmt::format("{}\"{}\"", failed.empty() ? "" : ", ", model.name);
+            }
+        }
+        if (!failed.empty()) {
+            failed = "Of " + failed + " no run ended well, so that nothing is said of it. ";
+        }
+        if (std::isfinite(second.aic)) {
+            best.message = fmt::format(fmt::runtime(verdict), study.compared_key, first.name, first.weight, second.name,
+                                       second.weight, failed + best.message);
+        } else {
+            best.message = fmt::format("{} \"{}\" has nothing to be compared with. {}{}", study.compared_key, first.name, failed,
+                                       best.message);
+        }
     }
     best.models = std::move(models);
     best.seconds = seconds;

@@ -76,12 +76,30 @@ void add_covariance(Fit& fit, const Eigen::MatrixXd& more) {
     fit.correlation = fit.covariance.cwiseQuotient(sd * sd.transpose());
 }
 
-Eigen::VectorXd least_squares(const Eigen::MatrixXd& slope, const Eigen::VectorXd& change) {
+// [parameters x columns of `change`]
+Eigen::MatrixXd least_squares(const Eigen::MatrixXd& slope, const Eigen::MatrixXd& change) {
     const Eigen::VectorXd scale = slope.colwise().norm().unaryExpr([](double length) { return length > 0 ? 1 / length : 1.0; });
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
     factors.setThreshold(resolved);
     factors.compute(slope * scale.asDiagonal());
-    return scale.cwiseProduct(factors.solve(change));
+    return scale.asDiagonal() * factors.solve(change);
+}
+
+// Changes of residuals, each stretch of an experiment's curve on which they go one way in a column of its own.
+Eigen::MatrixXd stretches_of(const Eigen::VectorXd& change, const std::vector<FitResidual>& stations) {
+    std::vector<Eigen::Index> column(stations.size(), 0);
+    for (std::size_t i = 1; i < stations.size(); ++i) {
+        const auto row = static_cast<Eigen::Index>(i);
+        const bool goes_on = stations[i].experiment == stations[i - 1].experiment && stations[i].kind == stations[i - 1].kind &&
+                             change[row] * change[row - 1] >= 0;
+        column[i] = column[i - 1] + (goes_on ? 0 : 1);
+    }
+    Eigen::MatrixXd found = Eigen::MatrixXd::Zero(change.size(), column.empty() ? 1 : column.back() + 1);
+    for (std::size_t i = 0; i < stations.size(); ++i) {
+        const auto row = static_cast<Eigen::Index>(i);
+        found(row, column[i]) = change[row];
+    }
+    return found;
 }
 
 }  // namespace
@@ -109,7 +127,12 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
         slope.row(row) *= before[i].sigma / after[i].sigma;
         change[row] *= share.at(before[i].experiment);
     }
-    Eigen::VectorXd left = least_squares(slope, change);
+    const Eigen::MatrixXd parts = least_squares(slope, stretches_of(change, before));
+    const Eigen::VectorXd together = parts.rowwise().sum(), apart = parts.rowwise().norm();
+    Eigen::VectorXd left = together;
+    for (Eigen::Index j = 0; j < left.size(); ++j) {
+        left[j] = std::copysign(std::max(std::abs(together[j]), apart[j]), together[j]);
+    }
     for (Eigen::Index j = 0; j < left.size() && on_one_grid; ++j) {
         const Parameter& parameter = model.box().parameters()[static_cast<std::size_t>(j)];
         if (is_modulus(parameter)) {

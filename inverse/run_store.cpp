@@ -7,8 +7,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cmath>
+#include <string_view>
 
 namespace crampfit {
 namespace {
@@ -98,14 +101,6 @@ Evaluation evaluation_of(const StoredRun& run) {
     return evaluation;
 }
 
-std::string quoted_for_shell(const std::string& word) {
-    std::string quoted = "'";
-    for (const char letter : word) {
-        quoted += letter == '\'' ? "'\\''" : std::string(1, letter);
-    }
-    return quoted + "'";
-}
-
 // A value as a scene reads it, with the same bits: what is divided by the unit's factor and multiplied again may be one off.
 std::string with_unit(double value, const Parameter& parameter) {
     double number = value / parameter.unit_factor;
@@ -128,6 +123,21 @@ bool knows(const Scene& scene, const std::string& key) {
 }
 
 }  // namespace
+
+std::string quoted_for_shell(const std::string& word) {
+    const auto is_plain = [](char letter) {
+        return std::isalnum(static_cast<unsigned char>(letter)) != 0 ||
+               std::string_view("._/-+=:,").find(letter) != std::string_view::npos;
+    };
+    if (!word.empty() && word[0] != '-' && std::ranges::all_of(word, is_plain)) {
+        return word;
+    }
+    std::string quoted = "'";
+    for (const char letter : word) {
+        quoted += letter == '\'' ? "'\\''" : std::string(1, letter);
+    }
+    return quoted + "'";
+}
 
 RunStore::RunStore(const RunKeeping& keeping, const Study& study, const std::atomic<bool>* stop) : stop_(stop) {
     if (keeping.file.empty()) {

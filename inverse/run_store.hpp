@@ -58,6 +58,9 @@ class RunStore {
 /// What --set changed in the scenes of a study, as it stands on a command line after its other words.
 std::string scene_settings_text(const Study& study);
 
+/// A word of a command line, in quotes where a shell would make something else of it.
+std::string quoted_for_shell(const std::string& word);
+
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one
 /// that did not fail.
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation);

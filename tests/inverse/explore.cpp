@@ -65,6 +65,30 @@ TEST(VerificationPosterior, EnsembleHasTheMomentsOfANormalDistribution) {
     EXPECT_NEAR(covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1)), 0.9, 4 * (1 - 0.81) / std::sqrt(independent));
 }
 
+TEST(VerificationPosterior, AShortChainIsWorthWhatItsMeansScatter) {
+    const Normal normal;
+    constexpr int chains = 60;
+    double squares = 0, worth = 0;
+    for (int k = 0; k < chains; ++k) {
+        Objective objective = normal.objective(10000);
+        const Ensemble ensemble =
+            draw_ensemble(objective, half_misfit, normal.mean, normal.covariance, 1000, static_cast<unsigned>(100 + k));
+        const double independent = 1000 / ensemble.correlation_time.maxCoeff();
+        worth += independent / chains;
+        for (int j = 0; j < 2; ++j) {
+            double mean = 0;
+            for (const crampfit::Run& sample : ensemble.samples) {
+                mean += sample.x[j] / 1000;
+            }
+            squares += std::pow(mean - normal.mean[j], 2) / (normal.covariance(j, j) / independent) / (2 * chains);
+        }
+    }
+    std::printf("chains of 1000 samples, worth %.0f: their means scatter by %.2f of what so many would\n", worth,
+                std::sqrt(squares));
+    EXPECT_LT(std::sqrt(squares), 1.3);
+    EXPECT_GT(std::sqrt(squares), 0.7);
+}
+
 TEST(VerificationPosterior, KeepsToTheCubeAndCutsADistributionOffThere) {
     Normal normal;
     normal.mean = {0.0, 0.5};

@@ -85,6 +85,27 @@ TEST(UnitResiduals, ArrivalSigmaIsTheNoiseOverTheSlope) {
     }
 }
 
+TEST(UnitResiduals, OneRowAloneIsToldAndSpeaksForItsWindowOnly) {
+    Experiment experiment = straight_experiment();
+    const Comparison before(experiment);
+    experiment.data.force[200] = 9999;
+    Comparison with(experiment);
+    const auto told = [](const Comparison& comparison) {
+        return std::ranges::any_of(comparison.remarks(),
+                                   [](const std::string& remark) { return remark.find("one row alone") != std::string::npos; });
+    };
+    EXPECT_FALSE(told(before));
+    EXPECT_TRUE(told(with));
+    with.know_to(0.002);
+    Comparison without(straight_experiment());
+    without.know_to(0.002);
+    int others = 0;
+    for (std::size_t i = 0; i < without.stations().size(); ++i) {
+        others += std::abs(with.stations()[i].sigma / without.stations()[i].sigma - 1) > 1e-9;
+    }
+    EXPECT_LE(others, 2);
+}
+
 TEST(UnitResiduals, AJumpIsTimedToTheRowsAroundIt) {
     Experiment experiment = straight_experiment();
     experiment.noise.crack_length = 1e-9;

@@ -317,6 +317,25 @@ TEST(SystemSensitivity, GivesTheSameBitsForAnyNumberOfThreadsAndCountsFailedRuns
     }
 }
 
+TEST(SystemSensitivity, NoSobolIndicesOfAnOutputThatRunsLack) {
+    // Runs of tough latewood end early.
+    Study study = output_study(SensitivityMethod::sobol, 64);
+    study.outputs.push_back({"force at 0.5 mm", StudyOutput::Kind::force_at, 0.5e-3, 0});
+    SensitivityOptions options;
+    options.forward = [](const Scene& scene, const std::atomic<bool>*) {
+        Record record = FakeWedge{}(scene);
+        if (scene.materials.at("LW").toughness > 300) {
+            record.series.resize(record.series.size() / 2);
+        }
+        return record;
+    };
+    const Sensitivity result = study_sensitivity(study, options);
+    for (const SensitivityIndex& index : result.indices) {
+        EXPECT_EQ(std::isnan(index.value), index.output == "force at 0.5 mm") << index.output;
+    }
+    EXPECT_NE(result.message.find("runs have no 'force at 0.5 mm' and without them"), std::string::npos) << result.message;
+}
+
 TEST(SystemSensitivity, SaysSoWhenEveryRunFails) {
     SensitivityOptions options;
     options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::runtime_error("no luck"); };
