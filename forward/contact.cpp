@@ -91,15 +91,22 @@ std::optional<SlidingBody::Meeting> SlidingBody::depth_in(const Shape& shape, co
     return Meeting{on.distance, on.normal};
 }
 
-// The same of a face of a crack, with `toward` into its wood.
+// The same of a face of a crack, with `toward` into its wood: under a circle less the more the way out lies aside of that.
 std::optional<SlidingBody::Meeting> SlidingBody::depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward) {
-    const auto nearest = depth_in(shape, x);
-    if (!nearest || nearest->out.dot(toward) >= std::cos(sees_sides_within)) return nearest;
-    const auto* polygon = std::get_if<Polygon>(&shape);
-    if (!polygon) return std::nullopt;
-    const auto side = nearest_facing(*polygon, x, toward, sees_sides_within);
-    if (!side || side->distance > most_in_nearest * nearest->depth) return std::nullopt;
-    return Meeting{side->distance, side->normal};
+    const auto met = depth_in(shape, x);
+    if (!met) return std::nullopt;
+    const double least = std::cos(sees_sides_within);
+    const double toward_it = met->out.dot(toward);
+    if (const auto* polygon = std::get_if<Polygon>(&shape)) {
+        if (toward_it >= least) return met;
+        const auto side = nearest_facing(*polygon, x, toward, sees_sides_within);
+        if (!side || side->distance > most_in_nearest * met->depth) return std::nullopt;
+        return Meeting{side->distance, side->normal};
+    }
+    const double share = (toward_it - least) / (1.0 - least);
+    if (share <= 0.0) return std::nullopt;
+    const Vec2 turns = met->depth * met->curvature / (1.0 - least) * (toward - toward_it * met->out);
+    return Meeting{share * met->depth, share * met->out - turns, met->curvature};
 }
 
 std::vector<SlidingBody::Corner> SlidingBody::corners_of(const Shape& shape) {
@@ -127,6 +134,22 @@ const SlidingBody::Corner* SlidingBody::corner_on(const Vec2& place, const Vec2&
     };
     const auto found = std::ranges::find_if(corners_, pushes);
     return found == corners_.end() ? nullptr : &*found;
+}
+
+// Whether the surface goes on from a facet to the left of the way into its wood by so much, or for numbers below 0 to the right,
+// and a facet more [m].
+bool SlidingBody::surface_reaches(int facet, double along) const {
+    const Vec2 way = std::copysign(1.0, along) * left_of(-this->facet(facet).normal);
+    const int after = next(facet, true);
+    const bool forth = after >= 0 && (this->facet(after).position - this->facet(facet).position).dot(way) > 0.0;
+    double gone = 0.0;
+    for (int i = facet; gone < std::abs(along) + this->facet(facet).length;) {
+        const int on = next(i, forth);
+        if (on < 0 || !goes_on_[forth ? i : on]) return false;
+        gone += (this->facet(on).position - this->facet(i).position).norm();
+        i = on;
+    }
+    return true;
 }
 
 // How far along the surface a corner pushes on both sides [m].
@@ -368,7 +391,11 @@ std::optional<SlidingBody::Meeting> SlidingBody::meeting_at(int facet, const Vec
         const Vec2 into_wood = toward();
         if (const Corner* corner = corner_on(place, into_wood)) {
             const Vec2 ahead = corner->at - place;
-            return Meeting{ahead.dot(into_wood), into_wood, 0.0, 1.0 - std::abs(cross(ahead, into_wood)) / corner_width()};
+            const double aside = cross(ahead, into_wood), share = 1.0 - std::abs(aside) / corner_width();
+            const Vec2 along = left_of(into_wood);
+            if (surface_reaches(facet, -aside))
+                return Meeting{ahead.dot(into_wood), into_wood, 0.0, share,
+                               std::copysign(1.0 / (share * corner_width()), aside) * along};
         }
     }
     return depth_in(shape_, place);
@@ -452,8 +479,14 @@ std::vector<SlidingBody::Touch> SlidingBody::touches(const Vec2& moved, const st
         const double depth = met.depth - cut_off_[i];
         touch.normal = met.out;
         touch.curvature = met.curvature;
-        const Press pressed = press(met.share * stiffness_[i], depth, onset);
+        Press pressed = press(met.share * stiffness_[i], depth, onset);
         if (pressed.force <= 0.0) continue;
+        if (i >= outline() || met.share < 1.0) {  // the slope of its energy
+            const Vec2 push = pressed.force * met.out + pressed.energy * met.aside;
+            pressed.stiffness *= push.squaredNorm() / (pressed.force * pressed.force);
+            pressed.force = push.norm();
+            touch.normal = push.normalized();
+        }
         touch.force = pressed.force;
         touch.stiffness = pressed.stiffness;
         touch.energy = pressed.energy;

@@ -24,14 +24,13 @@ bool is_small_circle(const Shape& shape, const Layout& layout);
 /// Under a round body a facet of a smooth outline goes with the mean of the surface about it, a cell wide and up to the mouth of
 /// a crack: displacements are linear from node to node, and a wheel that fits itself into each bend at a node is tilted to and
 /// fro as it rolls, by 2 degrees with ten cells across. Facets of a picture's voids go alone, and those under bodies many cells
-/// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is
-/// taken for cut off.
+/// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is taken for cut off.
 ///
 /// A convex corner of a polygon pushes against the wood's own normal, on the surface within a cell of it, where that lies well
-/// between the normals of the corner's sides: else wood that gives way on either side of a sharp edge would be pinched by them.
+/// between the normals of the corner's sides and the surface goes on beyond it: else wood that gives way on either side of a sharp edge would be pinched by them.
 ///
 /// A crack that is closed ends at a body that presses on its mouth: faces feel only what comes from within the crack, the sides
-/// of a body whose normals lie within 60 degrees of the wood's own.
+/// of a body whose normals lie within 60 degrees of the wood's own, and as deep as it is where they are the same.
 class SlidingBody {
   public:
     /// `faces` must outlive this; null: none.
@@ -96,10 +95,11 @@ class SlidingBody {
     double full_stiffness(int i) const;
     void soften(const std::vector<int>& facets, const std::vector<double>& mass);
     struct Meeting {
-        double depth;            // of a place in the body, before anything is cut off [m]
-        Vec2 out;                // unit, the way out of the body
-        double curvature = 0.0;  // of the surfaces of equal depth there, 1 / radius [1/m]
-        double share = 1.0;      // of the facet's stiffness
+        double depth;               // of a place in the body, before anything is cut off [m]
+        Vec2 out;                   // how fast it falls, and which way: unit but for faces of cracks
+        double curvature = 0.0;     // of the surfaces of equal depth there, 1 / radius [1/m]
+        double share = 1.0;         // of the facet's stiffness
+        Vec2 aside = Vec2::Zero();  // how fast the logarithm of the share falls [1/m]
     };
     struct Corner {
         Vec2 at;             // [m]
@@ -109,6 +109,7 @@ class SlidingBody {
     static std::optional<Meeting> depth_in_crack(const Shape& shape, const Vec2& x, const Vec2& toward);
     static std::vector<Corner> corners_of(const Shape& shape);
     double corner_width() const;
+    bool surface_reaches(int facet, double along) const;
     const Corner* corner_on(const Vec2& place, const Vec2& toward) const;
     std::optional<Meeting> meeting_at(int facet, const Vec2& place, const std::vector<Vec2>& displacement) const;
     double may_go() const;

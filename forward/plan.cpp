@@ -524,7 +524,10 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
     if (parts_touch)
         choose("parts", fmt::format("{}, which push on one another without friction", scene.specimen.parts.size()),
                "given in specimen.parts");
-    choose("contact", plan.contact ? "bodies push on the specimen's outline" : "none between bodies and specimen",
+    choose("contact",
+           !plan.contact          ? "none between bodies and specimen"
+           : scene.cracks.empty() ? "bodies push on the specimen's outline"
+                                  : "bodies push on the specimen's outline and on faces of cracks",
            plan.contact ? "penalty of up to ten cells' stiffness, never pulls" : "no body that slides");
     if (plan.quasistatic && plan.finer_at_wheels)
         choose("wood under wheels", "boxes with finer cells along their ways",

@@ -62,7 +62,7 @@ std::string scene_settings_text(const Study& study);
 std::string quoted_for_shell(const std::string& word);
 
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one
-/// that did not fail.
+/// that did not fail, or that the user has stopped.
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation);
 
 }  // namespace crampfit
