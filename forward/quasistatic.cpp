@@ -538,6 +538,20 @@ bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(place.further, time)) return false;
     const LoadState& there = places_[place.further].station.states.at(time);
     place.station.ahead[time] = {there.end_potential, there.end_power};
+    const auto rubs = [](const Body& body) { return body.contact.coefficient > 0.0; };
+    if (std::ranges::none_of(scene_.bodies, rubs)) return true;
+    // What bodies that rub have dissipated hangs on the whole way to a state, and was another with the longer crack all along:
+    // what the advance releases is told by G at its ends.
+    const LoadState& here = place.station.states.at(time);
+    double released = 0.0;
+    for (const MovingTip& tip : place.station.moving) {
+        const std::size_t k = 2 * tip.crack + tip.at_end;
+        double length = 0.0;
+        for (std::size_t i = 1; i < tip.route.size(); ++i) length += (tip.route[i] - tip.route[i - 1]).norm();
+        released += 0.5 * (here.tips[k].G + there.tips[k].G) * length * place.station.thickness;
+    }
+    const double by_time = time_of(time) > 0.0 ? 2.0 * released / time_of(time) : 0.0;
+    place.station.ahead[time] = {here.potential - released, here.power - by_time};
     return true;
 }
 

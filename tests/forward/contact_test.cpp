@@ -514,6 +514,36 @@ TEST(VerificationContact, ABodyThatSplitsAStripTakesItsToughness) {
     }
 }
 
+// It opens the crack as one without friction does, whatever it dissipates.
+TEST(VerificationContact, AWheelThatRubsMakesACrackGrowAtTheSameG) {
+    std::vector<double> plain;
+    for (const double coefficient : {0.0, 0.1}) {
+        Scene scene = split_strip(Circle{Vec2(-0.8e-3, 3e-3), 0.5e-3}, 0.25e-3);
+        scene.specimen.size = {20e-3, 6e-3};
+        scene.specimen.cutouts = {Polygon{{Vec2(0.0, 2.3e-3), Vec2(1.4e-3, 3e-3), Vec2(0.0, 3.7e-3)}}};
+        scene.materials["EW"] = {40e6, 0.3, 300.0, 100.0};
+        scene.bodies[0].velocity = {1e-3 / 60.0, 0.0};
+        scene.cracks[0].points = {Vec2(1.4e-3, 3e-3), Vec2(7e-3, 3e-3)};
+        scene.cracks[0].advance = 0.5e-3;
+        scene.output.samples = 60;
+        scene.solver.kind = SolverKind::quasistatic;
+        scene.stop.displacement = 4e-3;
+        if (coefficient > 0.0) scene.bodies[0].contact = {Contact::Kind::friction, coefficient};
+        const Record record = simulate(scene);
+        ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+        double worst = 0.0;
+        for (std::size_t i = 0; i < record.driving.size(); ++i) {
+            if (coefficient == 0.0) plain.push_back(record.driving[i].G);
+            if (i == plain.size()) break;  // it goes a place farther
+            worst = std::max(worst, std::abs(record.driving[i].G / plain[i] - 1.0));
+        }
+        std::printf("friction %.1f: G at growth of %zu places within %.1f %% of that without\n", coefficient,
+                    record.driving.size(), 100.0 * worst);
+        EXPECT_GT(record.driving.size(), 3u);
+        EXPECT_LT(worst, 0.04);
+    }
+}
+
 TEST(UnitContact, AClosedCrackUnderABodyDoesNotStiffenTheWood) {
     const Polygon punch{{Vec2(9.5e-3, 10e-3), Vec2(10.5e-3, 10e-3), Vec2(11e-3, 14e-3), Vec2(9e-3, 14e-3)}};
     for (const Shape& shape : {Shape(Circle{Vec2(10e-3, 12e-3), 2e-3}), Shape(punch)}) {
