@@ -196,7 +196,7 @@ std::string scene_settings_text(const Study& study) {
 }
 
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {
-    if (evaluation.usable() || evaluation.status.starts_with("interrupted")) {
+    if (evaluation.usable() || evaluation.status.ends_with("stopped by the user")) {
         return "";
     }
     std::string text = fmt::format("a run failed: {}; to run it again:", evaluation.status);
