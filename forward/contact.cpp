@@ -113,9 +113,7 @@ std::vector<SlidingBody::Corner> SlidingBody::corners_of(const Shape& shape) {
     const auto* polygon = std::get_if<Polygon>(&shape);
     if (!polygon) return {};
     std::vector<Vec2> points = polygon->points;
-    double area = 0.0;
-    for (std::size_t k = 0; k < points.size(); ++k) area += cross(points[k], points[(k + 1) % points.size()]);
-    if (area > 0.0) std::ranges::reverse(points);  // clockwise: the left of a side is outside
+    if (signed_area(points) > 0.0) std::ranges::reverse(points);  // clockwise: the left of a side is outside
     std::vector<Corner> corners;
     for (std::size_t n = points.size(), k = 0; k < n; ++k) {
         const Vec2 first = left_of(points[k] - points[(k + n - 1) % n]).normalized();

@@ -85,8 +85,7 @@ std::string beyond_contact(const Scene& scene, const Discretisation& body, const
             };
             if (std::max(depth(face.left), depth(face.right)) < counts_as_overlap * cell) continue;
             text += fmt::format("; bodies.{} lies over faces of cracks.{} by more than half a cell, about {}, which it has not "
-                                "opened: do not trust "
-                                "its force",
+                                "opened: do not trust its force",
                                 rigid.name, crack, in_mm(face.at_rest));
             break;
         }

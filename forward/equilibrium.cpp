@@ -194,24 +194,36 @@ void Equilibrium::find_forces() {
                    std::function([&](int field, const Vec2& push) { force_[field] += push; }));
         face_energy_ += 0.5 * place.dot(face_stiffness(k) * place) + drag.energy + drag.dissipated;
     }
-    for (const Boundary::Traction& t : boundary_.tractions) {
-        for (int k = 0; k < 4; ++k) force_[t.field[k]] += t.facet.weight[k] * t.force;
-        reaction_[t.driver] += t.force;
-    }
+    push_from_outside(force_, reaction_);
     contact_energy_ = 0.0;
-    for (std::size_t i = 0; i < sliding_.size(); ++i) {
-        const int driver = sliding_driver_[i];
-        reaction_[driver] = sliding_[i].push(force_);
-        contact_energy_ += sliding_[i].stored_energy() + sliding_[i].dissipated();
+    for (const SlidingBody& body : sliding_) contact_energy_ += body.stored_energy() + body.dissipated();
+    for (const Boundary::Held& held : boundary_.held)
+        if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
+}
+
+// By tractions, bodies, and edges where these do not hold fields.
+void Equilibrium::push_from_outside(std::vector<Vec2>& force, std::vector<Vec2>& reaction) const {
+    for (const Boundary::Traction& t : boundary_.tractions) {
+        for (int k = 0; k < 4; ++k) force[t.field[k]] += t.facet.weight[k] * t.force;
+        reaction[t.driver] += t.force;
     }
+    for (std::size_t i = 0; i < sliding_.size(); ++i) reaction[sliding_driver_[i]] = sliding_[i].push(force);
     for (const Boundary::Tied& tie : boundary_.tied) {
         if (mass_[tie.field] == 0.0) continue;
         const double pull = tie_of(tie) * lag(tie);
-        force_[tie.field][tie.axis] += pull;
-        reaction_[tie.driver][tie.axis] += pull;
+        force[tie.field][tie.axis] += pull;
+        reaction[tie.driver][tie.axis] += pull;
     }
+}
+
+Equilibrium::Wood Equilibrium::wood() const {
+    Wood wood{potential() - contact_energy_ + traction_work() - edge_ties_energy(),
+              std::vector<Vec2>(displacement_.size(), Vec2::Zero())};
+    std::vector<Vec2> reaction(reaction_.size(), Vec2::Zero());
+    push_from_outside(wood.forces, reaction);
     for (const Boundary::Held& held : boundary_.held)
-        if (mass_[held.field] > 0.0) reaction_[held.driver][held.axis] -= force_[held.field][held.axis];
+        if (mass_[held.field] > 0.0) wood.forces[held.field][held.axis] -= force_[held.field][held.axis];
+    return wood;
 }
 
 GridFactor::Element Equilibrium::element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {
@@ -559,6 +571,11 @@ double Equilibrium::ties_energy() const {
     double energy = 0.0;
     for (const FieldPair& pair : cracks_.pairs)
         energy += 0.5 * tie_of(pair) * (displacement_[pair.left] - displacement_[pair.right]).squaredNorm();
+    return energy + edge_ties_energy();
+}
+
+double Equilibrium::edge_ties_energy() const {
+    double energy = 0.0;
     for (const Boundary::Tied& tie : boundary_.tied)
         if (mass_[tie.field] > 0.0) energy += 0.5 * tie_of(tie) * lag(tie) * lag(tie);
     return energy;

@@ -33,9 +33,7 @@ struct Curve {
 
 // Smooth pieces of a polygon's outline; the specimen lies in it or around it.
 std::vector<Curve> sides_of(const std::vector<Vec2>& points, bool specimen_is_inside) {
-    double area = 0.0;
-    for (std::size_t k = 0; k < points.size(); ++k) area += cross(points[k], points[(k + 1) % points.size()]);
-    const double inward = (area > 0.0) == specimen_is_inside ? 1.0 : -1.0;
+    const double inward = (signed_area(points) > 0.0) == specimen_is_inside ? 1.0 : -1.0;
     std::vector<Curve> curves;
     for (std::size_t k = 0; k < points.size(); ++k) {
         const Vec2& a = points[k];

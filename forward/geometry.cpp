@@ -8,12 +8,6 @@ namespace crampfit {
 
 namespace {
 
-double signed_area(const std::vector<Vec2>& points) {
-    double twice = 0.0;
-    for (std::size_t k = 0; k < points.size(); ++k) twice += cross(points[k], points[(k + 1) % points.size()]);
-    return 0.5 * twice;
-}
-
 bool inside_polygon(const std::vector<Vec2>& points, const Vec2& x) {
     bool in = false;
     for (std::size_t k = 0, last = points.size() - 1; k < points.size(); last = k++) {
@@ -41,6 +35,12 @@ OutlinePoint nearest_on_polygon(const std::vector<Vec2>& points, const Vec2& x, 
 }
 
 }  // namespace
+
+double signed_area(const std::vector<Vec2>& corners) {
+    double twice = 0.0;
+    for (std::size_t k = 0; k < corners.size(); ++k) twice += cross(corners[k], corners[(k + 1) % corners.size()]);
+    return 0.5 * twice;
+}
 
 bool inside(const Shape& shape, const Vec2& x) {
     if (const auto* circle = std::get_if<Circle>(&shape)) return (x - circle->centre).norm() <= circle->radius;

@@ -57,6 +57,9 @@ struct Piece {
 /// What of a box lies on the left of the line from a to b. No area: nothing does.
 Piece left_part(const Box& box, const Vec2& a, const Vec2& b);
 
+/// Of a polygon, positive where its corners go round counter-clockwise [m^2].
+double signed_area(const std::vector<Vec2>& corners);
+
 /// Nearest place on segment a-b to x, as a fraction of the way from a to b.
 double nearest_on_segment(const Vec2& a, const Vec2& b, const Vec2& x);
 

@@ -10,6 +10,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <span>
 
 namespace crampfit {
@@ -96,6 +97,7 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
                          const std::vector<std::string>& numbers, int threads, const Quasistatic* leader)
     : scene_(scene), plan_(plan), materials_(materials), leader_(leader), body_(body),
       equilibrium_(scene, plan, materials, body_, threads), fine_tip_(scene, plan, materials, body_, numbers_, threads > 1),
+      bodies_rub_(std::ranges::any_of(scene.bodies, [](const Body& rigid) { return rigid.contact.coefficient > 0.0; })),
       jobs_(threads > 1) {
     numbers_ = MaterialSlope::of(scene, numbers, body_);
     if (numbers.empty()) equilibrium_.forget_yield_slopes();
@@ -333,7 +335,12 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
 }
 
 Quasistatic::Known Quasistatic::known_here(int time) const {
-    return {time, equilibrium_.displacements(), equilibrium_.potential(), equilibrium_.power(), equilibrium_.contacts()};
+    return {time,
+            equilibrium_.displacements(),
+            equilibrium_.potential(),
+            equilibrium_.power(),
+            equilibrium_.contacts(),
+            bodies_rub_ ? equilibrium_.wood() : Equilibrium::Wood{}};
 }
 
 // A displacement of a place, on the fields of one that follows it.
@@ -530,6 +537,32 @@ const Equilibrium* Quasistatic::stand_at_last() {
     return nullptr;
 }
 
+// What bodies that rub have dissipated hangs on the whole way to a state, and was another where the crack has been longer all
+// along: with their grip as it is, an advance releases what they and the grips do on the wood's way from one state to the other,
+// by forces that change evenly, less what that stores. In linear wood this is Betti's 1/2 (f1 u2 - f2 u1). Found: that less the
+// difference of the potentials [J].
+double Quasistatic::beside_potentials(int number, int further, int time) const {
+    const auto from = places_[number].known.find(time), to = places_[further].known.find(time);
+    if (time == 0 || from == places_[number].known.end() || to == places_[further].known.end()) return 0.0;
+    const Known &here = from->second, &there = to->second;
+    std::vector<Vec2> before = here.displacement;
+    int shared = number;  // the place that both come from
+    for (int other = further; shared != other;) {
+        if (other > shared) other = places_[other].parent;
+        else before.resize(before.size() - places_[std::exchange(shared, places_[shared].parent)].new_fields.size());
+    }
+    const std::size_t fields = before.size();
+    before = handed_on(shared, before, further);
+    double work = 0.0;
+    for (std::size_t f = 0; f < before.size(); ++f) {
+        Vec2 force = 0.5 * there.wood.forces[f];
+        if (f < fields) force += 0.5 * here.wood.forces[f];
+        work += force.dot(there.displacement[f] - before[f]);
+    }
+    const double beside = work + here.wood.energy - there.wood.energy - (here.potential - there.potential);
+    return coarse() ? beside + (beside - coarse()->beside_potentials(number, further, time)) / 3.0 : beside;
+}
+
 // Knows a place, and the one an advance further, at a time.
 bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(number, time)) return false;
@@ -538,20 +571,11 @@ bool Quasistatic::know_ahead(std::size_t number, int time) {
     if (!plan_.linear && !know(place.further, time)) return false;
     const LoadState& there = places_[place.further].station.states.at(time);
     place.station.ahead[time] = {there.end_potential, there.end_power};
-    const auto rubs = [](const Body& body) { return body.contact.coefficient > 0.0; };
-    if (std::ranges::none_of(scene_.bodies, rubs)) return true;
-    // What bodies that rub have dissipated hangs on the whole way to a state, and was another with the longer crack all along:
-    // what the advance releases is told by G at its ends.
+    if (!bodies_rub_ || time == 0) return true;
     const LoadState& here = place.station.states.at(time);
-    double released = 0.0;
-    for (const MovingTip& tip : place.station.moving) {
-        const std::size_t k = 2 * tip.crack + tip.at_end;
-        double length = 0.0;
-        for (std::size_t i = 1; i < tip.route.size(); ++i) length += (tip.route[i] - tip.route[i - 1]).norm();
-        released += 0.5 * (here.tips[k].G + there.tips[k].G) * length * place.station.thickness;
-    }
-    const double by_time = time_of(time) > 0.0 ? 2.0 * released / time_of(time) : 0.0;
-    place.station.ahead[time] = {here.potential - released, here.power - by_time};
+    const double beside = beside_potentials(static_cast<int>(number), place.further, time);
+    const double released = here.potential - there.end_potential + beside;
+    place.station.ahead[time] = {there.end_potential - beside, here.power - 2.0 * released / time_of(time)};
     return true;
 }
 

@@ -197,9 +197,10 @@ double Quasistatic::released(int number, int time) {
         if (!know_exactly(number, time) || !know_exactly(further, time)) return -1.0;
         nearest = time;
     }
-    const double energy = from.at(nearest).potential - to.at(nearest).end_potential;
+    const double energy = from.at(nearest).potential - to.at(nearest).end_potential +
+                          (bodies_rub_ ? beside_potentials(number, further, nearest) : 0.0);
     if (nearest == time || energy <= 0.0) return energy;
-    const double power = from.at(nearest).power - to.at(nearest).end_power;
+    const double power = bodies_rub_ ? 2.0 * energy / time_of(nearest) : from.at(nearest).power - to.at(nearest).end_power;
     return energy * std::pow(time_of(time) / time_of(nearest), power * time_of(nearest) / energy);
 }
 

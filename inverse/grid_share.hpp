@@ -14,11 +14,10 @@ namespace crampfit {
 /// changes by m, 3 m / (2^2 - 1) may be left: the grid convergence index for two grids and a method of second order (Roache 1994,
 /// Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116), which takes in errors that go
 /// with the first power of the cell. Found: how far the truth may lie from the best point to either side [parameters, of the unit
-/// cube]. A scene that takes a third of the difference of both grids off has moved away from the wide
-/// one by four thirds of that difference: there three quarters of g count. Where what g says by
-/// stretches of the curves, each by itself, takes from each other, its root of the sum of squares counts. On one grid errors of
-/// stiffness go with the first power of the cell, as where bands are two or three cells wide: of a modulus 3 m / (2 - 1) may be
-/// left, up to what can be told.
+/// cube]. A scene that takes a third of the difference of both grids off has moved away from the wide one by four thirds of that
+/// difference: there three quarters of g count. Where what g says by stretches of the curves, each by itself, takes from each
+/// other, its root of the sum of squares counts. On one grid errors of stiffness go with the first power of the cell, as where
+/// bands are two or three cells wide: of a modulus 3 m / (2 - 1) may be left, up to what can be told.
 ///
 /// `about` tells of the best point.
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about);

@@ -46,11 +46,20 @@ class Indices {
     const char* method_;
 };
 
-// One output's values at all points; not a number where it could not be had.
-// Part of the runs that may lack an output: others are left out, and what is left of the box is none, where Sobol's indices are
-// of parameters that vary independently.
-constexpr double most_lacking = 0.01;
+// How many of the runs that ended well have no such output.
+std::ptrdiff_t lacking(const std::vector<Run>& runs, std::size_t output) {
+    return std::ranges::count_if(runs, [&](const Run& run) {
+        return run.evaluation->usable() && std::isnan(run.evaluation->residuals[static_cast<Eigen::Index>(output)]);
+    });
+}
 
+// They are left out. Beyond a hundredth what is left is no box, where Sobol's indices are of parameters that vary independently.
+bool leaves_no_box(const std::vector<Run>& runs, std::size_t output) {
+    const auto good = std::ranges::count_if(runs, [](const Run& run) { return run.evaluation->usable(); });
+    return static_cast<double>(lacking(runs, output)) > 0.01 * static_cast<double>(good);
+}
+
+// One output's values at all points; not a number where it could not be had.
 std::vector<double> values_of(const Evaluations& evaluations, std::size_t output) {
     std::vector<double> values;
     for (const auto& evaluation : evaluations) {
@@ -161,11 +170,7 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
     case SensitivityMethod::sobol: {
         const SaltelliDesign design(box.size(), samples > 0 ? samples : default_rows, seed);
         for_each_output(design.points(), [&](std::size_t k, std::vector<double> values) {
-            const double failed = static_cast<double>(std::ranges::count_if(
-                objective.at(design.points()), [](const auto& evaluation) { return !evaluation || !evaluation->usable(); }));
-            const double none =
-                static_cast<double>(std::ranges::count_if(values, [](double value) { return std::isnan(value); }));
-            if (none - failed > most_lacking * (static_cast<double>(values.size()) - failed)) {
+            if (leaves_no_box(objective.runs(), k)) {
                 std::ranges::fill(values, std::numeric_limits<double>::quiet_NaN());
             }
             const SaltelliDesign::Indices of_output = design.indices(values);
@@ -232,12 +237,8 @@ void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopp
             fmt::format("; {} of {} runs failed and are left out; the first: {}", failed, runs.size(), first->evaluation->status);
     }
     for (std::size_t k = 0; k < result.outputs.size() && good > 0; ++k) {
-        const auto without = std::count_if(result.runs.begin(), result.runs.end(),
-                                           [&](const SensitivityRun& run) { return std::isnan(run.outputs[k]); }) -
-                             failed;
-        if (without > 0) {
-            const bool no_box =
-                method == SensitivityMethod::sobol && static_cast<double>(without) > most_lacking * static_cast<double>(good);
+        if (const auto without = lacking(runs, k); without > 0) {
+            const bool no_box = method == SensitivityMethod::sobol && leaves_no_box(runs, k);
             result.message +=
                 fmt::format("; {} runs have no '{}' {}", without, result.outputs[k].name,
                             no_box ? "and without them parameters are not independent any more: no Sobol indices of it; "

@@ -171,6 +171,7 @@ TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
     for (const double advance : {0.8e-3, 0.0}) {
         Scene scene = across_rings(0.4e-3);
         scene.cracks[0].advance = advance;
+        scene.specimen.rings->pith.x() -= 0.05e-3;  // of no number two derivatives take each other off
         KeptWalk walk(scene, numbers);
         const Record base = walk.run(scene, {});
         std::size_t jump = 1;
@@ -199,8 +200,7 @@ TEST(GradientRecord, OneSidedWhereTheCrackJumps) {
                 std::printf("jump at %.4f mm, advance %.1f mm, %s %s: force %s it goes by %.6f N, by differences %.6f N\n",
                             1e3 * there, 1e3 * advance, key.c_str(), side > 0 ? "more" : "less", after ? "after" : "before",
                             slope, difference);
-                // Forces of whole runs are known to 1e-12 of their size, and their differences over so small a step to 1e-7.
-                EXPECT_NEAR(slope, difference, 1e-5 * std::abs(difference) + 1e-7 * std::abs(here)) << key;
+                EXPECT_NEAR(slope, difference, 1e-5 * std::abs(difference)) << key;
             }
         }
     }

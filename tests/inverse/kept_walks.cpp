@@ -298,11 +298,11 @@ TEST(SystemTurningFit, FindsModuliAndToughnessesOfDataWithoutNoise) {
 
 // Another way that leaves less of the data than noise would lies 15 % off in the modulus of latewood; from there the
 // true one is neither close by nor met by looking all over the box.
-TEST(SlowTurningFit, FindsTheTrueWayFromNearby) {
+TEST(SlowTurningFit, FindsTheTrueWayATwentiethOfTheBoxAway) {
     Scene scene;
     scene.model = {.plane = PlaneCondition::stress, .thickness = 10e-3, .cell = 0.25e-3};
     scene.specimen.size = {12e-3, 8e-3};
-    scene.specimen.rings = Rings{Vec2(-10.3578e-3, 22.9056e-3), 1.8289e-3, 0.466, 0.0};
+    scene.specimen.rings = Rings{Vec2(-10.3578e-3, 23.0056e-3), 1.8289e-3, 0.466, 0.0};
     scene.specimen.cutouts = {Circle{{6.215e-3, 6.4e-3}, 0.711e-3}};
     scene.materials["EW"] = {50e6, 0.3036, 300, 100};
     scene.materials["LW"] = {309.129e6, 0.2547, 750, 223.01};
@@ -316,7 +316,7 @@ TEST(SlowTurningFit, FindsTheTrueWayFromNearby) {
     scene.solver.kind = SolverKind::quasistatic;
     scene.stop.displacement = 2e-3;
     scene.stop.crack_length = 9e-3;
-    const Fit fit = fit_study(study_of_itself(scene, {1.15, 0.92, 1.15, 1.2}), {});
+    const Fit fit = fit_study(study_of_itself(scene, {1.3, 0.839, 1.328, 1.517}), {});
     expect_truth(fit, scene);
 }
 

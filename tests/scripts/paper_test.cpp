@@ -48,7 +48,9 @@ Trip run(const std::string& sample, double speed, double cell_mm, Overrides furt
 }
 
 const Overrides turned_by_45 = {{"specimen.rotation", "45 deg"}, {"specimen.offset", "[\"3.5 mm\", \"-3.571 mm\"]"}};
-const Overrides from_latewood = {{"cracks.0.points", "[[\"5.25 mm\", \"0 mm\"], [\"5.25 mm\", \"2.5 mm\"]]"}};
+Overrides from_latewood(double x_mm) {
+    return {{"cracks.0.points", fmt::format(R"([["{0} mm", "0 mm"], ["{0} mm", "2.5 mm"]])", x_mm)}};
+}
 
 // Of the crack's way and time, what is spent in earlywood and in latewood, by density.
 bool is_latewood(const MaterialMap& materials, const Vec2& x) { return materials.at(x).density > 0.5 * (300.0 + 750.0); }
@@ -212,19 +214,20 @@ TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
 
 // The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness
 // latewood turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no
-// more of its way in latewood than the straight way on does, over which the waving band leans. At equilibrium one that starts in
-// latewood does not leave it.
+// more of its way in latewood than the straight way on does, over which the waving band leans, and one that starts in latewood
+// leaves it. Where is chance, at any rate: of starts a hundredth of a millimetre apart one stays in it twice as long.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const Trip from_earlywood = run("tension_rt", speed, 0.1);
         const double outside = spent(from_earlywood).latewood(), straight = latewood_straight_ahead(from_earlywood.scene);
-        const double inside = spent(run("tension_rt", speed, 0.1, from_latewood)).latewood();
+        double inside = 0.0;
+        for (const double start : {5.2, 5.25, 5.3})
+            inside += spent(run("tension_rt", speed, 0.1, from_latewood(start))).latewood() / 3;
         std::printf("RT at %.0f m/s: started in earlywood %.0f %% of the way in latewood, straight on %.0f %%; started in "
                     "latewood %.0f %%\n",
                     speed, 100 * outside, 100 * straight, 100 * inside);
         EXPECT_LE(outside, straight + 0.02);  // the rows of a record are up to 0.01 of the way apart
-        if (speed == at_equilibrium) EXPECT_GT(inside, 0.7);
-        else EXPECT_LT(inside, 0.7);
+        EXPECT_LT(inside, 0.7);
     }
 }
 
