@@ -84,6 +84,7 @@ void ExplicitSolver::grow(int crack, bool at_end) {
     if (state.since_turn >= leg) {
         TipLoad load = load_at(crack, at_end);
         load.opening = state.opening;
+        if (!by_intensities) load.K_I = std::numeric_limits<double>::quiet_NaN();  // it swings more than a mean of the opening
         direction = growth_direction(criterion, tip, load, materials_, leg);
         // Waves make K_I and K_II swing: half of a turn is taken, the other half if the next leg still asks for it.
         if (by_intensities && std::isfinite(state.since_turn)) direction = (direction + tip.direction).normalized();

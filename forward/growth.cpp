@@ -14,11 +14,10 @@ namespace {
 
 Vec2 turned(const Vec2& direction, double angle) { return std::cos(angle) * direction + std::sin(angle) * left_of(direction); }
 
-Vec2 normal_to_opening(const CrackTip& tip, const Vec2& opening) {
-    // Nairn 2007, on the side that lies ahead.
-    const Vec2 normal = left_of(opening);
-    if (std::abs(normal.dot(tip.direction)) <= 0.1 * normal.norm()) return tip.direction;
-    return normal.normalized() * (normal.dot(tip.direction) > 0 ? 1.0 : -1.0);
+// Of the normal to an opening, on the side that lies ahead (Nairn 2007).
+double normal_angle(const CrackTip& tip, const Vec2& opening) {
+    const double along = opening.dot(tip.direction), across = cross(tip.direction, opening);
+    return std::abs(across) > 0.1 * opening.norm() ? -std::atan(along / across) : 0.0;
 }
 
 // Mean over a straight way; a boundary across it is seen to 1/16 of it [J/m^2].
@@ -75,23 +74,52 @@ double hoop_stress_angle(const CrackTip& tip, const TipLoad& load, const Materia
     });
 }
 
-// Whether a tip lies so near a boundary that K_I and K_II say little: within `reach` ahead, behind or to a side the wood is more
-// than twice as stiff as at the tip, or less than half. There K is that of cells of several woods, and vanishes or grows without
+// How far a tip is from where K_I and K_II say little, up to `reach`: ahead, behind or to a side the wood is more than twice as
+// stiff as at the tip there, or less than half. Near it K is that of cells of several woods, and vanishes or grows without
 // bound besides: crossing a photographed latewood band it has asked for turns of 40 degrees to either side within two cells,
 // where cells half as wide ask for none; beside one it has turned cracks by 60 degrees into latewood, where they stood.
-bool near_other_wood(const CrackTip& tip, const MaterialMap& materials, double reach) {
+double way_to_other_wood(const CrackTip& tip, const MaterialMap& materials, double reach) {
     constexpr double most = 2.0;
-    constexpr int samples = 8;  // to either side
-    if (materials.homogeneous()) return false;
+    constexpr int samples = 16, halvings = 10;
+    if (materials.homogeneous()) return reach;
     const double here = materials.at(tip.position).plane_modulus();
-    for (const Vec2& way : {tip.direction, left_of(tip.direction)}) {
-        for (int i = -samples; i <= samples; ++i) {
-            const double modulus = materials.at(tip.position + reach * i / samples * way).plane_modulus();
+    double nearest = reach;
+    for (const Vec2& way : {tip.direction, Vec2(-tip.direction), left_of(tip.direction), Vec2(-left_of(tip.direction))}) {
+        const auto is_other = [&](double distance) {
+            const double modulus = materials.at(tip.position + distance * way).plane_modulus();
             const bool is_wood = modulus > 0.0 && here > 0.0;  // a void is no other wood
-            if (is_wood && (modulus > most * here || most * modulus < here)) return true;
+            return is_wood && (modulus > most * here || most * modulus < here);
+        };
+        double near = 0.0;
+        for (int i = 1; i <= samples && near < nearest; ++i) {
+            double far = reach * i / samples;
+            if (!is_other(far)) {
+                near = far;
+                continue;
+            }
+            for (int k = 0; k < halvings; ++k) {
+                const double middle = 0.5 * (near + far);
+                (is_other(middle) ? far : near) = middle;
+            }
+            nearest = std::min(nearest, far);
+            break;
         }
     }
-    return false;
+    return nearest;
+}
+
+// Nairn's opening is that just behind the tip. What the grid shows there swings by 3 degrees with the tip's place in a cell, as
+// points change sides; K_I and K_II, from a domain about the tip, tell it within 0.3. Near other wood it is the better one, and
+// a crack must not turn at once where the one takes over from the other.
+double normal_to_opening(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
+    const double by_grid = normal_angle(tip, load.opening);
+    if (!std::isfinite(load.K_I)) return by_grid;
+    const double trust = std::max(0.0, 2.0 * way_to_other_wood(tip, materials, increment) / increment - 1.0);
+    if (trust == 0.0) return by_grid;
+    const NearTipField field = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction);
+    const Vec2 opening = field.release() * Vec2(load.K_I, load.K_II);  // by K_I across, by K_II along
+    const double by_intensities = normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction);
+    return std::lerp(by_grid, by_intensities, trust);
 }
 
 }  // namespace
@@ -141,14 +169,15 @@ double least_leg_in_cells(const CrackLine& line, bool at_end) {
 
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
                       double increment) {
-    if (steered_by_intensities(criterion) && near_other_wood(tip, materials, increment)) load.K_I = 1.0, load.K_II = 0.0;
+    if (steered_by_intensities(criterion) && way_to_other_wood(tip, materials, increment) < increment)
+        load.K_I = 1.0, load.K_II = 0.0;
     constexpr double rounding = 1e-7;  // [rad]; a crack on a line of symmetry, often one of the grid, would leave it by a hair
     const auto by_criterion = [&]() -> Vec2 {
         switch (criterion) {
         case GrowthDirection::straight:
             return tip.direction;
         case GrowthDirection::normal_to_opening:
-            return normal_to_opening(tip, load.opening);
+            return turned(tip.direction, normal_to_opening(tip, load, materials, increment)).normalized();
         case GrowthDirection::hoop_stress: {
             const double angle =
                 materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);

@@ -83,9 +83,11 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
     const double way = 0.25 * quarters * growing.increment;
     const double cell = body_.layout.cell.maxCoeff();
-    if (steered_by_intensities(criterion) && leg(line, growing.at_end) < (least_leg_in_cells(line, growing.at_end) - 1e-6) * cell)
-        return tip.position + way * tip.direction;
-    const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
+    TipLoad load = state->tips[2 * growing.crack + growing.at_end];
+    if (leg(line, growing.at_end) < (least_leg_in_cells(line, growing.at_end) - 1e-6) * cell) {
+        if (steered_by_intensities(criterion)) return tip.position + way * tip.direction;
+        if (std::isfinite(load.K_I)) load.K_I = 1.0, load.K_II = 0.0;
+    }
     return tip.position + way * growth_direction(criterion, tip, load, materials_, std::max(growing.increment, cell));
 }
 

@@ -207,10 +207,38 @@ TEST(UnitGrowthDirection, RoundingTurnsNoCrack) {
     tip.position = {5e-3, 5e-3};
     tip.direction = {1.0, 0.0};
     TipLoad load;
+    load.K_I = std::numeric_limits<double>::quiet_NaN();
     load.opening = {1e-12, 1.0};
     EXPECT_EQ(growth_direction(GrowthDirection::normal_to_opening, tip, load, materials, 1e-3), tip.direction);
     load.opening = {1e-5, 1.0};
     EXPECT_NE(growth_direction(GrowthDirection::normal_to_opening, tip, load, materials, 1e-3), tip.direction);
+}
+
+// K_I = K_II ask for a turn by 45 degrees, the opening that is seen for none.
+TEST(UnitGrowthDirection, TheOpeningIsToldByKAwayFromBoundariesAndSeenBesideThem) {
+    Scene scene = block({10e-3, 10e-3}, 1e-3);
+    scene.specimen.material.clear();
+    scene.specimen.rings = Rings{Vec2(5e-3 - 100.0, 5e-3), 200.0, 0.5, 0.0};  // boundary at x = 5 mm
+    scene.materials["LW"] = {400e6, 0.33, 400.0, earlywood().toughness};
+    const MaterialMap materials(scene);
+    for (const auto& [x, asked] :
+         {std::pair{4.4e-3, -45.0}, {4.6249e-3, -22.5}, {4.9e-3, 0.0}, {5.1e-3, 0.0}, {5.3751e-3, -22.5}}) {
+        for (const Vec2& ahead : {Vec2(1, 0), Vec2(-1, 0), Vec2(0, 1)}) {
+            CrackTip tip;
+            tip.position = {x, 5e-3};
+            tip.direction = ahead;
+            TipLoad load;
+            load.opening = left_of(ahead);
+            load.K_I = load.K_II = 1.0;
+            const auto turned = [&] {
+                const Vec2 way = growth_direction(GrowthDirection::normal_to_opening, tip, load, materials, 0.5e-3);
+                return std::atan2(cross(ahead, way), ahead.dot(way)) / degree;
+            };
+            EXPECT_NEAR(turned(), asked, 0.05) << x;
+            load.K_I = std::numeric_limits<double>::quiet_NaN();
+            EXPECT_EQ(turned(), 0.0) << x;
+        }
+    }
 }
 
 TEST(UnitGrowthDirection, LargestEnergyReleaseIsNearLargestHoopStressInOneWood) {
@@ -259,6 +287,29 @@ TEST(VerificationSlantedCrack, KAndFirstKink) {
             EXPECT_NEAR(load.K_II, K_II, 0.02 * K0);
             EXPECT_LT(std::abs(kink), 1.5);
         }
+    }
+}
+
+// The normal to the opening of a slanted crack lies across the tension, wherever its tip lies in a cell.
+TEST(VerificationSlantedCrack, NormalToItsOpening) {
+    SlantedCrack plate;
+    plate.remote(1, 1) = 1e5;
+    for (const double slant : {15.0, 30.0, 45.0, 60.0}) {
+        plate.angle = slant * degree;
+        double worst = 0.0;
+        for (int k = 0; k < 8; ++k) {
+            plate.offset = {0.13 + 0.125 * k, 0.27 + 0.375 * k};
+            const AtRest run(slanted_crack(plate));
+            ASSERT_TRUE(run.solved());
+            for (const bool at_end : {true, false}) {
+                const CrackTip& tip = run.equilibrium.cracks().lines[0].tip(at_end);
+                const Vec2 way = growth_direction(GrowthDirection::normal_to_opening, tip, run.load(at_end), run.materials,
+                                                  run.body.layout.cell.maxCoeff());
+                worst = std::max(worst, std::abs(std::atan(way.y() / way.x())) / degree);
+            }
+        }
+        std::printf("slanted crack, %2.0f deg: normal to its opening up to %.2f deg off\n", slant, worst);
+        EXPECT_LT(worst, 1.0);
     }
 }
 
