@@ -215,7 +215,7 @@ TEST(SlowPaper, ObliqueRingsMakeACrackZigZag) {
 // The paper has a crack along the rings drawn to latewood, and one in latewood stays there. In elastic wood of one toughness
 // latewood turns a crack away and out (`VerificationAlongRings`), and so it goes here: a crack that starts in earlywood spends no
 // more of its way in latewood than the straight way on does, over which the waving band leans, and one that starts in latewood
-// leaves it. Where is chance, at any rate: of starts a hundredth of a millimetre apart one stays in it twice as long.
+// leaves it. Where is chance in motion: of starts a hundredth of a millimetre apart one stays in it twice as long.
 TEST(SlowPaper, RtIsNotDrawnToLatewood) {
     for (const double speed : {at_equilibrium, 2.0, 10.0}) {
         const Trip from_earlywood = run("tension_rt", speed, 0.1);
