@@ -113,10 +113,11 @@ double way_to_other_wood(const CrackTip& tip, const MaterialMap& materials, doub
 // a crack must not turn at once where the one takes over from the other.
 double normal_to_opening(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
     const double by_grid = normal_angle(tip, load.opening);
-    if (!std::isfinite(load.K_I)) return by_grid;
+    const LocalWood wood = materials.at(tip.position);
+    if (!std::isfinite(load.K_I) || wood.plane_modulus() <= 0.0) return by_grid;  // a void has no K
     const double trust = std::max(0.0, 2.0 * way_to_other_wood(tip, materials, increment) / increment - 1.0);
     if (trust == 0.0) return by_grid;
-    const NearTipField field = near_tip_field(materials.at(tip.position).elasticity.stiffness(), tip.direction);
+    const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 opening = field.release() * Vec2(load.K_I, load.K_II);  // by K_I across, by K_II along
     const double by_intensities = normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction);
     return std::lerp(by_grid, by_intensities, trust);
