@@ -386,7 +386,9 @@ std::optional<SlidingBody::Meeting> SlidingBody::meeting_at(int facet, const Vec
     if (facet >= outline()) return inside(shape_, place) ? depth_in_crack(shape_, place, toward()) : std::nullopt;
     const auto is_near = [&](const Corner& corner) { return (corner.at - place).norm() < std::numbers::sqrt2 * corner_width(); };
     if (std::ranges::any_of(corners_, is_near)) {
-        const Vec2 into_wood = toward();
+        // As at rest: about a corner the wood turns by as much as it gives way, and a normal that turned with it would need the
+        // moment that goes with that.
+        const Vec2 into_wood = -f.normal;
         if (const Corner* corner = corner_on(place, into_wood)) {
             const Vec2 ahead = corner->at - place;
             const double aside = cross(ahead, into_wood), share = 1.0 - std::abs(aside) / corner_width();

@@ -9,9 +9,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
-#include <utility>
 #include <span>
+#include <utility>
 
 namespace crampfit {
 
@@ -592,7 +593,10 @@ LoadState Quasistatic::at(std::size_t station_number, double time) {
         const int low = std::min(last_time_before(time), last_time_ - 1);
         const bool between = time > time_of(low);
         if (!can_stand(station_number, time)) fail();
-        if (between && !station.states.count(low + 1) && station.states.count(low)) time = time_of(low);
+        if (!station.states.count(low) || (between && !station.states.count(low + 1))) {
+            const auto beyond = station.states.upper_bound(low);
+            if (beyond != station.states.begin()) time = std::min(time, time_of(std::prev(beyond)->first));
+        }
     }
     return station.states.empty() ? nothing(time) : station.at(time);
 }

@@ -431,7 +431,8 @@ TEST(UnitContact, SaysWhereItsModelsEnd) {
     EXPECT_NE(simulate(sliding_parts(1e-3)).message.find("slid along"), std::string::npos);
 }
 
-// A tool goes down into a notch of right angle, whose flanks its bottom's corners meet, sharp or rounded.
+// A tool goes down into a notch of right angle, whose flanks its bottom's corners meet, sharp or rounded. Sharp ones press as if
+// they were a cell wide; deeper by a tenth of a cell of the finer grid they may find no equilibrium.
 TEST(UnitContact, SharpCornersPushAsRoundedOnesDo) {
     std::map<std::pair<double, double>, double> force;  // by cell and radius
     for (const double cell : {0.5e-3, 0.25e-3})
@@ -451,16 +452,18 @@ TEST(UnitContact, SharpCornersPushAsRoundedOnesDo) {
             scene.bodies = {sliding("tool", tool, {0.0, -1.0})};
             scene.measure = {"tool", "tool"};
             scene.solver.kind = SolverKind::quasistatic;
-            scene.stop.time = 0.1e-3;
+            scene.stop.time = 0.03e-3;
             scene.output.samples = 4;
             const Record record = simulate(scene);
             ASSERT_EQ(record.status, RunStatus::finished) << record.message;
             force[{cell, radius}] = record.series.back().force;
-            std::printf("cells of %.2f mm, corners of radius %.1f mm: %.3f N\n", 1e3 * cell, 1e3 * radius,
-                        record.series.back().force);
+            std::printf("cells of %.2f mm, corners of radius %.1f mm: %.3f N, books off by %.2f %%\n", 1e3 * cell, 1e3 * radius,
+                        record.series.back().force, 100 * record.worst_energy_imbalance);
+            EXPECT_LT(record.worst_energy_imbalance, 0.03);
         }
-    for (const double cell : {0.5e-3, 0.25e-3})
-        EXPECT_NEAR(force.at({cell, 0.0}), force.at({cell, 0.2e-3}), 0.1 * force.at({cell, 0.2e-3}));
+    const auto excess = [&](double cell) { return force.at({cell, 0.0}) / force.at({cell, 0.2e-3}) - 1.0; };
+    EXPECT_NEAR(excess(0.25e-3), 0.0, 0.2);
+    EXPECT_LT(excess(0.25e-3), 0.5 * excess(0.5e-3));
 }
 
 // A body is driven through a funnel into the crack of a strip, between its arms of 5 mm.
