@@ -382,8 +382,10 @@ double SlidingBody::sunk_at(int facet) const {
 std::optional<SlidingBody::Meeting> SlidingBody::meeting_at(int facet, const Vec2& place,
                                                             const std::vector<Vec2>& displacement) const {
     const Facet& f = this->facet(facet);
-    const auto toward = [&]() -> Vec2 { return -(Polar(gradient_at(body_, f.point, displacement)).turn * f.normal); };
-    if (facet >= outline()) return inside(shape_, place) ? depth_in_crack(shape_, place, toward()) : std::nullopt;
+    if (facet >= outline()) {
+        if (!inside(shape_, place)) return std::nullopt;
+        return depth_in_crack(shape_, place, -(Polar(gradient_at(body_, f.point, displacement)).turn * f.normal));
+    }
     const auto is_near = [&](const Corner& corner) { return (corner.at - place).norm() < std::numbers::sqrt2 * corner_width(); };
     if (std::ranges::any_of(corners_, is_near)) {
         // As at rest: about a corner the wood turns by as much as it gives way, and a normal that turned with it would need the

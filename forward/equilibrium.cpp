@@ -194,7 +194,7 @@ void Equilibrium::find_forces() {
                    std::function([&](int field, const Vec2& push) { force_[field] += push; }));
         face_energy_ += 0.5 * place.dot(face_stiffness(k) * place) + drag.energy + drag.dissipated;
     }
-    push_from_outside(force_, reaction_);
+    add_external_forces(force_, reaction_);
     contact_energy_ = 0.0;
     for (const SlidingBody& body : sliding_) contact_energy_ += body.stored_energy() + body.dissipated();
     for (const Boundary::Held& held : boundary_.held)
@@ -202,7 +202,7 @@ void Equilibrium::find_forces() {
 }
 
 // By tractions, bodies, and edges where these do not hold fields.
-void Equilibrium::push_from_outside(std::vector<Vec2>& force, std::vector<Vec2>& reaction) const {
+void Equilibrium::add_external_forces(std::vector<Vec2>& force, std::vector<Vec2>& reaction) const {
     for (const Boundary::Traction& t : boundary_.tractions) {
         for (int k = 0; k < 4; ++k) force[t.field[k]] += t.facet.weight[k] * t.force;
         reaction[t.driver] += t.force;
@@ -216,14 +216,14 @@ void Equilibrium::push_from_outside(std::vector<Vec2>& force, std::vector<Vec2>&
     }
 }
 
-Equilibrium::Wood Equilibrium::wood() const {
-    Wood wood{potential() - contact_energy_ + traction_work() - edge_ties_energy(),
-              std::vector<Vec2>(displacement_.size(), Vec2::Zero())};
+Equilibrium::FreeBody Equilibrium::free_body() const {
+    FreeBody free{potential() - contact_energy_ + traction_work() - edge_ties_energy(),
+                  std::vector<Vec2>(displacement_.size(), Vec2::Zero())};
     std::vector<Vec2> reaction(reaction_.size(), Vec2::Zero());
-    push_from_outside(wood.forces, reaction);
+    add_external_forces(free.external_forces, reaction);
     for (const Boundary::Held& held : boundary_.held)
-        if (mass_[held.field] > 0.0) wood.forces[held.field][held.axis] -= force_[held.field][held.axis];
-    return wood;
+        if (mass_[held.field] > 0.0) free.external_forces[held.field][held.axis] -= force_[held.field][held.axis];
+    return free;
 }
 
 GridFactor::Element Equilibrium::element(std::span<const int> fields, const Eigen::Matrix<double, 8, 8>& stiffness) const {

@@ -65,12 +65,12 @@ class Equilibrium {
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
     int factorisations() const { return factorisations_; }
 
-    /// The wood without what it meets.
-    struct Wood {
-        double energy;             // stored, and dissipated by crack faces and in wood that remembers [J]
-        std::vector<Vec2> forces;  // that bodies, edges and tractions put on its fields [fields] [N]
+    /// The specimen as a free body.
+    struct FreeBody {
+        double energy;                      // stored, and dissipated by crack faces and in wood that remembers [J]
+        std::vector<Vec2> external_forces;  // of bodies, edges and tractions on its fields [fields] [N]
     };
-    Wood wood() const;
+    FreeBody free_body() const;
 
     /// What moves while drivers do, the cracks standing, per time or per length that the drivers go.
     struct Motion {
@@ -182,7 +182,7 @@ class Equilibrium {
     void see_what_is_kept();
     double ties_energy() const;
     double edge_ties_energy() const;
-    void push_from_outside(std::vector<Vec2>& force, std::vector<Vec2>& reaction) const;
+    void add_external_forces(std::vector<Vec2>& force, std::vector<Vec2>& reaction) const;
     double kept(int field) const { return field < static_cast<int>(kept_.size()) ? kept_[field] : 1.0; }
     double tie_of(const FieldPair& pair) const;
     double tie_of(const Boundary::Tied& tie) const { return kept(tie.field) * tie.stiffness; }

@@ -341,7 +341,7 @@ Quasistatic::Known Quasistatic::known_here(int time) const {
             equilibrium_.potential(),
             equilibrium_.power(),
             equilibrium_.contacts(),
-            bodies_rub_ ? equilibrium_.wood() : Equilibrium::Wood{}};
+            bodies_rub_ ? equilibrium_.free_body() : Equilibrium::FreeBody{}};
 }
 
 // A displacement of a place, on the fields of one that follows it.
@@ -542,7 +542,7 @@ const Equilibrium* Quasistatic::stand_at_last() {
 // along: with their grip as it is, an advance releases what they and the grips do on the wood's way from one state to the other,
 // by forces that change evenly, less what that stores. In linear wood this is Betti's 1/2 (f1 u2 - f2 u1). Found: that less the
 // difference of the potentials [J].
-double Quasistatic::beside_potentials(int number, int further, int time) const {
+double Quasistatic::friction_correction(int number, int further, int time) const {
     const auto from = places_[number].known.find(time), to = places_[further].known.find(time);
     if (time == 0 || from == places_[number].known.end() || to == places_[further].known.end()) return 0.0;
     const Known &here = from->second, &there = to->second;
@@ -556,12 +556,12 @@ double Quasistatic::beside_potentials(int number, int further, int time) const {
     before = handed_on(shared, before, further);
     double work = 0.0;
     for (std::size_t f = 0; f < before.size(); ++f) {
-        Vec2 force = 0.5 * there.wood.forces[f];
-        if (f < fields) force += 0.5 * here.wood.forces[f];
+        Vec2 force = 0.5 * there.free_body.external_forces[f];
+        if (f < fields) force += 0.5 * here.free_body.external_forces[f];
         work += force.dot(there.displacement[f] - before[f]);
     }
-    const double beside = work + here.wood.energy - there.wood.energy - (here.potential - there.potential);
-    return coarse() ? beside + (beside - coarse()->beside_potentials(number, further, time)) / 3.0 : beside;
+    const double correction = work + here.free_body.energy - there.free_body.energy - (here.potential - there.potential);
+    return coarse() ? correction + (correction - coarse()->friction_correction(number, further, time)) / 3.0 : correction;
 }
 
 // Knows a place, and the one an advance further, at a time.
@@ -574,9 +574,9 @@ bool Quasistatic::know_ahead(std::size_t number, int time) {
     place.station.ahead[time] = {there.end_potential, there.end_power};
     if (!bodies_rub_ || time == 0) return true;
     const LoadState& here = place.station.states.at(time);
-    const double beside = beside_potentials(static_cast<int>(number), place.further, time);
-    const double released = here.potential - there.end_potential + beside;
-    place.station.ahead[time] = {there.end_potential - beside, here.power - 2.0 * released / time_of(time)};
+    const double correction = friction_correction(static_cast<int>(number), place.further, time);
+    const double released = here.potential - there.end_potential + correction;
+    place.station.ahead[time] = {there.end_potential - correction, here.power - 2.0 * released / time_of(time)};
     return true;
 }
 

@@ -95,7 +95,7 @@ class Quasistatic {
         double potential;                // [J]
         double power;                    // [W]
         Equilibrium::Contacts contacts = {};
-        Equilibrium::Wood wood = {};  // where bodies rub
+        Equilibrium::FreeBody free_body = {};  // where bodies rub
     };
     struct Way {                         // from one equilibrium to another
         int from;                        // the time of the one
@@ -169,7 +169,7 @@ class Quasistatic {
     std::vector<int> closer_places(const std::array<int, 3>& about, double now);
     int place_between(int number, int quarters, double now);
     double released(int number, int time);
-    double beside_potentials(int number, int further, int time) const;
+    double friction_correction(int number, int further, int time) const;
     bool follow_leader(std::size_t place);
     bool let_move(int number, unsigned tips, double now);
     void keep_only_from(int number);

@@ -200,7 +200,7 @@ double Quasistatic::released(int number, int time) {
         nearest = time;
     }
     const double energy = from.at(nearest).potential - to.at(nearest).end_potential +
-                          (bodies_rub_ ? beside_potentials(number, further, nearest) : 0.0);
+                          (bodies_rub_ ? friction_correction(number, further, nearest) : 0.0);
     if (nearest == time || energy <= 0.0) return energy;
     const double power = bodies_rub_ ? 2.0 * energy / time_of(nearest) : from.at(nearest).power - to.at(nearest).end_power;
     return energy * std::pow(time_of(time) / time_of(nearest), power * time_of(nearest) / energy);
