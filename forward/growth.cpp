@@ -74,38 +74,37 @@ double hoop_stress_angle(const CrackTip& tip, const TipLoad& load, const Materia
     });
 }
 
-// How far a tip is from where K_I and K_II say little, up to `reach`: ahead, behind or to a side the wood is more than twice as
-// stiff as at the tip there, or less than half. Near it K is that of cells of several woods, and vanishes or grows without
-// bound besides: crossing a photographed latewood band it has asked for turns of 40 degrees to either side within two cells,
-// where cells half as wide ask for none; beside one it has turned cracks by 60 degrees into latewood, where they stood.
-double way_to_other_wood(const CrackTip& tip, const MaterialMap& materials, double reach) {
-    constexpr double most = 2.0;
+// How far K_I and K_II at a tip can be trusted, from 0 to 1: not within `near` of wood that is much stiffer or softer, ahead, behind
+// or to a side, wholly from `far` on. Near it K is that of cells of several woods, and vanishes or grows without bound besides:
+// crossing a photographed latewood band it has asked for turns of 40 degrees to either side within two cells, where cells half as
+// wide ask for none; beside one it has turned cracks by 60 degrees into latewood, where they stood. Wood of 1.4 times the stiffness
+// is the same still, of 2.8 times another: between them trust falls, as with the way, and no small change of a modulus, by which
+// a pixel would count or not, turns a crack.
+double trust_in_intensities(const CrackTip& tip, const MaterialMap& materials, double near, double far) {
+    constexpr double same = 0.5, other = 1.5;  // [powers of two]
     constexpr int samples = 16, halvings = 10;
-    if (materials.homogeneous()) return reach;
+    if (materials.homogeneous()) return 1.0;
     const double here = materials.at(tip.position).plane_modulus();
-    double nearest = reach;
+    double doubt = 0.0;
     for (const Vec2& way : {tip.direction, Vec2(-tip.direction), left_of(tip.direction), Vec2(-left_of(tip.direction))}) {
-        const auto is_other = [&](double distance) {
+        const auto otherness = [&](double distance) {
             const double modulus = materials.at(tip.position + distance * way).plane_modulus();
-            const bool is_wood = modulus > 0.0 && here > 0.0;  // a void is no other wood
-            return is_wood && (modulus > most * here || most * modulus < here);
+            if (modulus <= 0.0 || here <= 0.0) return 0.0;  // a void is no other wood
+            return std::clamp((std::abs(std::log2(modulus / here)) - same) / (other - same), 0.0, 1.0);
         };
-        double near = 0.0;
-        for (int i = 1; i <= samples && near < nearest; ++i) {
-            double far = reach * i / samples;
-            if (!is_other(far)) {
-                near = far;
-                continue;
+        double before = 0.0;
+        for (int i = 1; i <= samples && before < 1.0; ++i) {
+            const double after = otherness(far * i / samples);
+            double lower = far * (i - 1) / samples, upper = far * i / samples;
+            for (int k = 0; k < halvings && after > before; ++k) {
+                const double middle = 0.5 * (lower + upper);
+                (otherness(middle) > 0.5 * (before + after) ? upper : lower) = middle;
             }
-            for (int k = 0; k < halvings; ++k) {
-                const double middle = 0.5 * (near + far);
-                (is_other(middle) ? far : near) = middle;
-            }
-            nearest = std::min(nearest, far);
-            break;
+            doubt = std::max(doubt, after * std::clamp((far - upper) / (far - near), 0.0, 1.0));
+            before = after;
         }
     }
-    return nearest;
+    return 1.0 - doubt;
 }
 
 // Nairn's opening is that just behind the tip. What the grid shows there swings by 3 degrees with the tip's place in a cell, as
@@ -115,8 +114,7 @@ double normal_to_opening(const CrackTip& tip, const TipLoad& load, const Materia
     const double by_grid = normal_angle(tip, load.opening);
     const LocalWood wood = materials.at(tip.position);
     if (!std::isfinite(load.K_I) || wood.plane_modulus() <= 0.0) return by_grid;  // a void has no K
-    const double trust = std::max(0.0, 2.0 * way_to_other_wood(tip, materials, increment) / increment - 1.0);
-    if (trust == 0.0) return by_grid;
+    const double trust = trust_in_intensities(tip, materials, 0.5 * increment, increment);
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 opening = field.release() * Vec2(load.K_I, load.K_II);  // by K_I across, by K_II along
     const double by_intensities = normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction);
@@ -170,8 +168,11 @@ double least_leg_in_cells(const CrackLine& line, bool at_end) {
 
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
                       double increment) {
-    if (steered_by_intensities(criterion) && way_to_other_wood(tip, materials, increment) < increment)
-        load.K_I = 1.0, load.K_II = 0.0;
+    if (steered_by_intensities(criterion)) {
+        const double trust = trust_in_intensities(tip, materials, increment, 1.5 * increment);
+        load.K_I = std::lerp(std::hypot(load.K_I, load.K_II), load.K_I, trust);
+        load.K_II *= trust;
+    }
     constexpr double rounding = 1e-7;  // [rad]; a crack on a line of symmetry, often one of the grid, would leave it by a hair
     const auto by_criterion = [&]() -> Vec2 {
         switch (criterion) {
