@@ -29,6 +29,16 @@ Curves read_times(const std::filesystem::path& file, std::size_t images) {
     return curves;
 }
 
+/// A load that was read as each image was taken: a row for each, in their order.
+PictureInstants read_load_at_images(const std::filesystem::path& file, std::size_t images) {
+    const Curves load = read_curves(file);
+    const std::size_t rows = std::max({load.time.size(), load.displacement.size(), load.force.size()});
+    if (rows != images)
+        throw InputError(file.string(), "", fmt::format("{} rows", rows),
+                         fmt::format("without --times the load needs a row for each of the {} images, in their order", images));
+    return {load.time, load.displacement, load.force, {}};
+}
+
 std::optional<double> number_of(const std::string& text, const NumberRule& rule, const char* option) {
     if (text.empty()) return std::nullopt;
     const double value = parse_quantity(text, rule.dimension, {"command line", option});
@@ -53,24 +63,29 @@ void add_picture_times(CLI::App& verb, PictureTimes& times) {
         verb.add_option("--times", times.times,
                         "Table with time [s] of each image, or displacement [mm] of the loading then, or both, a row an image")
             ->type_name("TIMES.csv");
-    auto* load =
-        verb.add_option("--load", times.load, "Table with time [s] and displacement [mm], force [N] or both, of the whole test")
-            ->type_name("LOAD.csv")
-            ->needs(table);
+    auto* load = verb.add_option("--load", times.load,
+                                 "Table with time [s] and displacement [mm], force [N] or both, of the whole test; without "
+                                 "--times a row an image")
+                     ->type_name("LOAD.csv");
     auto* offset = verb.add_option("--offset", times.offset,
                                    "Of the images' time 0 on the load's clock, as in \"1.2 s\"; without it, and where "
                                    "both tables have a displacement or a force, the clocks are set by that")
                        ->type_name("TIME")
+                       ->needs(table)
                        ->needs(load);
     verb.add_option("--trigger", times.trigger, "When the first image was taken, on the load's clock")
         ->type_name("TIME")
+        ->needs(table)
         ->needs(load)
         ->excludes(offset);
-    verb.add_option("--rate", times.rate, "Seconds of the load's clock in one of the images'")->type_name("NUMBER")->needs(load);
+    verb.add_option("--rate", times.rate, "Seconds of the load's clock in one of the images'")
+        ->type_name("NUMBER")
+        ->needs(table)
+        ->needs(load);
 }
 
 PictureInstants read_picture_times(const PictureTimes& times, std::size_t images, const CommonOptions& common) {
-    if (times.times.empty()) return {};
+    if (times.times.empty()) return times.load.empty() ? PictureInstants{} : read_load_at_images(times.load, images);
     const Curves taken = read_times(times.times, images);
     PictureInstants instants{taken.time, taken.displacement, taken.force, {}};
     if (times.load.empty()) return instants;

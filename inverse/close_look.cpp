@@ -7,6 +7,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -148,6 +151,81 @@ std::vector<std::size_t> ends_of(const Profile& profile, double height) {
 
 enum class Profiled { taken, goes_on, unconfirmed };
 
+// Takes intervals in the place of those that there are, where some parameters cannot be told: with standard errors as wide and
+// correlated as before, as what stands in for one another does so all the way. What ends within the box is told.
+void take_intervals(Uncertainty& u, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+    u.lower_95 = lower;
+    u.upper_95 = upper;
+    const Eigen::VectorXd factor = ((upper - lower) / (2 * u.quantile)).cwiseQuotient(u.covariance.diagonal().cwiseSqrt());
+    u.covariance = factor.asDiagonal() * u.covariance * factor.asDiagonal();
+    std::erase_if(u.untold, [&](const Untold& direction) {
+        if (goes_through_box(direction, lower, upper)) {
+            return false;
+        }
+        u.message.erase(u.message.find(direction.sentence), direction.sentence.size());
+        return true;
+    });
+}
+
+// Goes along with each parameter that cannot be told, from the best run to its bounds or to where the misfit has risen too far,
+// the others where they lower it most. Their intervals go on from there, by what they have where nothing else moves.
+void follow_untold(CloseLook& look, const std::vector<std::string>& names, const NearRuns& near) {
+    constexpr int halvings = 4;
+    Uncertainty& u = look.uncertainty;
+    const Eigen::VectorXd x = u.best.x;
+    std::vector<bool> is_untold(names.size(), false);
+    for (const Untold& direction : u.untold) {
+        u.covariance += direction.direction * direction.direction.transpose() / 12.0;
+        for (const Eigen::Index j : direction.parameters) {
+            is_untold[static_cast<std::size_t>(j)] = true;
+        }
+    }
+    Eigen::VectorXd least = x, most = x, ends_below = x, ends_above = x;
+    for (Eigen::Index j = 0; j < x.size(); ++j) {
+        for (const double bound : {0.0, 1.0}) {
+            double& end = bound < x[j] ? ends_below[j] : ends_above[j];
+            if (!is_untold[static_cast<std::size_t>(j)] || x[j] == bound) {
+                continue;
+            }
+            const auto is_as_good = [&](double at) {
+                Eigen::VectorXd start = x;
+                start[j] = at;
+                const auto there = near.lowest_held(start, j);
+                if (!there || there->evaluation->misfit - u.best.evaluation->misfit > u.rise[j]) {
+                    return false;
+                }
+                least = least.cwiseMin(there->x);
+                most = most.cwiseMax(there->x);
+                return true;
+            };
+            end = bound;
+            if (is_as_good(bound)) {
+                continue;
+            }
+            double good = x[j];
+            for (int i = 0; i < halvings; ++i) {
+                const double middle = 0.5 * (good + end);
+                (is_as_good(middle) ? good : end) = middle;
+            }
+        }
+    }
+    std::vector<std::string> followers;
+    Eigen::VectorXd lower(x.size()), upper(x.size());
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+        const bool is_one = is_untold[static_cast<std::size_t>(k)];
+        lower[k] = is_one ? ends_below[k] : std::max(0.0, u.lower_95[k] - (x[k] - least[k]));
+        upper[k] = is_one ? ends_above[k] : std::min(1.0, u.upper_95[k] + (most[k] - x[k]));
+        if (!is_one && upper[k] - lower[k] > room * (u.upper_95[k] - u.lower_95[k])) {
+            followers.push_back("'" + names[k] + "'");
+        }
+    }
+    take_intervals(u, lower, upper);
+    if (!followers.empty()) {
+        u.message += fmt::format("As that goes to its bounds, {} must follow: runs tell how far, and intervals count it. ",
+                                 fmt::join(followers, " and "));
+    }
+}
+
 // Puts the profile's intervals in the place of those of a parabola, unless one of them goes on beyond its window. Where the
 // parameters cannot be told, `confirm` says whether a misfit at a point of the box is what a run finds there.
 Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::VectorXd&, double misfit, double rise)>& confirm) {
@@ -208,20 +286,12 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
         lower[j] = std::max(0.0, u.best.x[j] - std::hypot(below, own));
         upper[j] = std::min(1.0, u.best.x[j] + std::hypot(above, own));
     }
-    // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
-    u.lower_95 = told ? Eigen::VectorXd(lower.cwiseMin(u.lower_95)) : lower;
-    u.upper_95 = told ? Eigen::VectorXd(upper.cwiseMax(u.upper_95)) : upper;
-    if (!told) {
-        // As wide as the intervals, and correlated as before: what stands in for one another does so all the way.
-        const Eigen::VectorXd factor = ((upper - lower) / (2 * u.quantile)).cwiseQuotient(u.covariance.diagonal().cwiseSqrt());
-        u.covariance = factor.asDiagonal() * u.covariance * factor.asDiagonal();
-        std::erase_if(u.untold, [&](const Untold& direction) {
-            if (goes_through_box(direction, lower, upper)) {
-                return false;
-            }
-            u.message.erase(u.message.find(direction.sentence), direction.sentence.size());
-            return true;
-        });
+    if (told) {
+        // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
+        u.lower_95 = u.lower_95.cwiseMin(lower);
+        u.upper_95 = u.upper_95.cwiseMax(upper);
+    } else {
+        take_intervals(u, lower, upper);
     }
     u.message += told ? "The intervals are the wider of those of the covariance and of the profile likelihood. "
                       : "The intervals are those of the profile likelihood. ";
@@ -263,8 +333,11 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
             const Eigen::VectorXd wanted = window.inside(y), at = in_box(wanted);
             return (wanted - at).cwiseAbs().maxCoeff() < rounding ? near(at, threads) : Evaluation{"outside the bounds", {}, {}};
         };
-        CloseLook here{
-            window, Objective(x.size(), evaluate, std::numeric_limits<int>::max(), near.threads, objective.stop()), {}, near.run};
+        CloseLook here{window,
+                       Objective(x.size(), evaluate, std::numeric_limits<int>::max(), near.threads, objective.stop()),
+                       {},
+                       near.run,
+                       near.exact};
         spread_about(x, here, seed);
         if (!here.objective.best()) {
             return std::nullopt;
@@ -301,14 +374,14 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
         if (how == Profiled::taken) {
             return profiled;
         }
-        if (how == Profiled::unconfirmed) {  // anywhere in the box
-            CloseLook anywhere = *first;
-            for (const Untold& u : anywhere.uncertainty.untold) {
-                anywhere.uncertainty.covariance += u.direction * u.direction.transpose() / 12.0;
-            }
-            return anywhere;
+        if (how == Profiled::unconfirmed) {
+            found = *first;
+            break;
         }
         profiled = look(wider(profiled->window, x));
+    }
+    if (!near.exact && !all_told(found.uncertainty)) {
+        follow_untold(found, names, near);
     }
     return found;
 }

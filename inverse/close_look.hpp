@@ -17,6 +17,7 @@ struct CloseLook {
     Objective objective;
     Uncertainty uncertainty;
     Objective::Evaluate near;  // of the box
+    bool is_exact;             // those
 
     /// What a profile of a parameter goes through: a window about the same place as wide, whose first axis is the only one to
     /// change it. Points outside the box stand for the nearest one within.
@@ -34,6 +35,8 @@ struct NearRuns {
     Objective::Evaluate run;
     bool exact;   // else to first order in some parameters
     int threads;  // side by side; 1 where each depends on the one before in its last digits
+    /// What runs find lowest with one parameter held where a start has it. May be empty.
+    std::function<std::optional<Run>(const Eigen::VectorXd& start, Eigen::Index held)> lowest_held = {};
 };
 
 /// Intervals about a point x [parameters] where runs nearby, `near`, are cheap. The window is as wide as the misfit says, so that
@@ -42,8 +45,9 @@ struct NearRuns {
 /// parameters stand in for one another, as a tough wood for a stiff one, along no axis of the box do differences stay in the
 /// valley and yet go as far as its intervals. The intervals take in those of the profile likelihood, as at the edge of a jump
 /// the misfit is no parabola; where that does not end and differences see no slope, the parameters cannot be told.
-/// Where `near` is not exact, runs that `objective` makes at the ends of such a profile confirm it. It says when to stop, too:
-/// nothing comes back where that is before the first run. `curves` and `names` as in `estimate_uncertainty`.
+/// Where `near` is not exact, runs that `objective` makes at the ends of such a profile confirm it; if they do not, runs go along
+/// with what cannot be told to its bounds, and the intervals of all that has to follow go as far. `objective` says when to stop,
+/// too: nothing comes back where that is before the first run. `curves` and `names` as in `estimate_uncertainty`.
 std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, const Eigen::VectorXd& x,
                                     const MeasuredCurves& curves, const std::vector<std::string>& names, unsigned seed);
 

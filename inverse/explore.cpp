@@ -46,9 +46,9 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
         result.message = "Too few runs ended well near the best one for a profile or a posterior. ";
         return result;
     }
-    if (!cheap && !uncertainty.untold.empty()) {
-        result.message = "No profile and no posterior: polynomials over the runs about the best one do not reach as far as what "
-                         "cannot be told. ";
+    if ((!cheap || (close && !close->is_exact)) && !uncertainty.untold.empty()) {
+        result.message = "No profile and no posterior: what runs about the best one tell does not reach as far as what cannot be "
+                         "told. ";
         return result;
     }
     Objective& model = !cheap ? *polynomials : close ? close->objective : objective;

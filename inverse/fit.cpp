@@ -199,6 +199,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     const auto begin = Clock::now();
     const bool own = !options.forward;
     check_study(study);
+    StudyModel(study, {}, 0.0, nullptr);  // bad data are refused before there is a file for runs
     const int threads = thread_count(options.threads);
     RunStore store(options.keeping, study, options.stop_requested);
     const UnitBox box(study.parameters);
@@ -254,7 +255,12 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
                 const std::vector<bool> exact = runs.walks().exact_near();
                 const bool all_exact = std::all_of(exact.begin(), exact.end(), [](bool one) { return one; });
-                const NearRuns near{runs.nearby().near(x), all_exact, runs.walks().depend_on_order() ? 1 : objective.threads()};
+                const auto lowest_held = [&](const Eigen::VectorXd& start, Eigen::Index held) {
+                    Objective beside = objective.branch(objective.budget_left(), objective.threads());
+                    return descend_held(beside, runs.nearby(), start, held, options.seed);
+                };
+                const NearRuns near{runs.nearby().near(x), all_exact, runs.walks().depend_on_order() ? 1 : objective.threads(),
+                                    lowest_held};
                 return look_close(objective, near, x, model.curves(), names, options.seed);
             };
             // A method that the study names has had its search; a lower point that a look comes upon is taken as it is.

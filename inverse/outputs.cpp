@@ -75,6 +75,17 @@ struct Arrest {
     double displacement = none;  // at which it moves on; none: not before the end [m]
 };
 
+// Between two places, to rounding, where something that holds at the second begins to.
+template <class Holds>
+double beginning(double from, double to, Holds holds) {
+    for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (from + to);
+        (holds(middle) ? to : from) = middle;
+    }
+    return to;
+}
+
+// Ends of rests lie between rows too, and move smoothly with the parameters.
 Arrest arrest(const Record& record, int number) {
     constexpr double least_stretch = 0.02;  // of the displacement
     constexpr double slow = 0.1;            // of the mean pace
@@ -83,25 +94,35 @@ Arrest arrest(const Record& record, int number) {
     const Curve crack(u, a);
     const double pace = (a.back() - a.front()) / (u.back() - u.front());
     const double stretch = least_stretch * (u.back() - u.front());
-    const auto grown = [&](std::size_t from, double length) { return length - a[from] >= slow * pace * stretch; };
+    const double little = slow * pace * stretch;
+    const auto goes_on = [&](double x) { return crack.at(x + stretch) - crack.at(x) >= little; };
+    std::vector<double> places;  // between which the growth over a stretch is linear
+    for (const double x : crack.x()) {
+        places.push_back(x);
+        places.push_back(x - stretch);
+    }
+    std::sort(places.begin(), places.end());
     int count = 0;
-    for (std::size_t i = 0; pace > 0 && i < u.size() && u[i] + stretch <= u.back(); ++i) {
-        if (a[i] <= a.front() || grown(i, crack.at(u[i] + stretch))) {
+    bool rests = false;
+    double before = u.front();
+    for (const double x : places) {
+        if (!(pace > 0) || x <= before || x + stretch > u.back()) {
             continue;
         }
-        std::size_t end = i;
-        while (end + 1 < u.size() && !grown(end, crack.at(std::min(u[end] + stretch, u.back())))) {
-            ++end;
+        const bool moves = goes_on(x);
+        if (rests && moves) {
+            const double last = beginning(before, x, goes_on), length = crack.at(last);
+            before = beginning(last, last + stretch, [&](double there) { return crack.at(there) >= length + little; });
+            rests = false;
+            if (++count == number) {
+                return {length, before};
+            }
+            continue;
         }
-        while (end + 1 < u.size() && !grown(i, a[end + 1])) {
-            ++end;
-        }
-        if (++count == number) {
-            return {a[end], end + 1 < u.size() ? u[end] : none};
-        }
-        i = end;
+        rests = rests || (!moves && crack.at(x) > a.front());
+        before = x;
     }
-    return {};
+    return rests && count + 1 == number ? Arrest{a.back(), none} : Arrest{};
 }
 
 }  // namespace

@@ -333,6 +333,31 @@ bool close_in(Objective& objective, const Nearby& nearby, unsigned seed) {
     return !objective.stopped();
 }
 
+std::optional<Run> descend_held(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, Eigen::Index held,
+                                unsigned seed) {
+    constexpr int most_steps = 3;
+    constexpr double hair = 1e-9;
+    const auto first = objective.at(start);
+    if (!first || !first->usable()) {
+        return std::nullopt;
+    }
+    Run here{start, first};
+    Eigen::VectorXd half = Eigen::VectorXd::Constant(start.size(), first_radius);
+    half[held] = hair;
+    for (int step = 0; step < most_steps && !objective.exhausted(); ++step) {
+        const Lowest trial = lowest_near(here.x, nearby, true, Window::around(here.x, half), objective, seed);
+        if (!is_worth_a_run(*here.evaluation, here.evaluation->misfit - trial.misfit)) {
+            break;
+        }
+        const auto there = objective.at(trial.x);
+        if (!there || !there->usable() || there->misfit >= here.evaluation->misfit) {
+            break;
+        }
+        here = {trial.x, there};
+    }
+    return here;
+}
+
 bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed) {
     const Run here = *objective.best();
     const auto dimensions = static_cast<Eigen::Index>(nearby.turning.size());

@@ -5,6 +5,7 @@
 #include "inverse/window.hpp"
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace crampfit {
@@ -53,6 +54,11 @@ bool close_in(Objective& objective, const Nearby& nearby, unsigned seed);
 /// each way, and the lowest point of what lies nearby is tried; none where that would take more than half of the runs left.
 /// Whether one was lower.
 bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, unsigned seed);
+
+/// The lowest point that is found from `start` on with one parameter held where it is; `start` itself where nothing is lower.
+/// Absent where the run there fails.
+std::optional<Run> descend_held(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, Eigen::Index held,
+                                unsigned seed);
 
 /// One more such descent from the best run, after runs have been weighed anew. Whether it ended by its own criterion, or early.
 bool descend_again(Objective& objective, const Nearby& nearby, const Enough& enough, unsigned seed);

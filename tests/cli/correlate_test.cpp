@@ -133,6 +133,16 @@ TEST(SystemTrack, SeriesAndExperiment) {
     EXPECT_TRUE(std::isnan(curves.force[3]));  // after the load's end
     EXPECT_NEAR(curves.crack_length[1], 110.5 * 20e-6, 5 * 20e-6);
     EXPECT_TRUE(std::isnan(curves.crack_length[3]));
+
+    // A load that was read as each image was taken.
+    words.resize(words.size() - 6);
+    words.insert(words.end(),
+                 {"--load", command.folder.write("at.csv", "force [N],time [s]\n1,10\n2,20\n3,30\n4,40\n").string()});
+    ASSERT_EQ(command.run(words).status, 0);
+    const Curves read =
+        read_curves(command.folder.write("again.csv", command.run({"csv", command.path("track.h5"), "experiment"}).out));
+    EXPECT_EQ(read.time, (std::vector<double>{10, 20, 30, 40}));
+    EXPECT_EQ(read.force, (std::vector<double>{1, 2, 3, 4}));
 }
 
 // A specimen without a pattern: displacements cannot be followed, and the crack is a dark line. This camera sees through where
@@ -186,7 +196,8 @@ TEST(SystemTrack, BadTimesAndLoad) {
     refused({"--times", file("force.csv", "force [N]\n1\n")}, "0 rows");
     const std::string times = file("times.csv", "time [s]\n1\n");
     const std::string rising = file("load.csv", "time [s],force [N]\n0,1\n2,1\n");
-    refused({"--load", rising}, "--times");
+    refused({"--load", rising}, "without --times the load needs a row for each of the 1 images");
+    refused({"--load", rising, "--offset", "1 s"}, "--times");
     refused({"--times", times, "--offset", "1 s"}, "--load");
     refused({"--times", times, "--load", rising, "--offset", "1"}, "--offset");
     refused({"--times", times, "--load", rising, "--offset", "1 s", "--trigger", "1 s"}, "--offset");

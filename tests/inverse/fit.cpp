@@ -1,11 +1,13 @@
 #include "inverse/fit.hpp"
 #include "datasets/error.hpp"
+#include "forward/simulate.hpp"
 #include "inverse/run_end.hpp"
 #include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -414,6 +416,70 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
     ASSERT_TRUE(there.usable());
     const double last = study.experiments[0].data.force.back();
     EXPECT_NEAR(there.residuals.tail(1)[0], (5e-3 * 380e6 * 0.1e-3 - last) / 2.0, 1e-6);
+}
+
+// The crack parts the specimen between two of the last rows: that tells toughness / E to 3 %, and beyond, to either side, the
+// misfit is flat.
+TEST(SystemFit, AToughnessThatOneJumpTellsIsFoundFromFarOff) {
+    const Scene scene = parse_scene(R"(
+[model]
+plane = "strain"
+thickness = "10 mm"
+cell = "0.5 mm"
+[specimen]
+size = ["10 mm", "10 mm"]
+material = "EW"
+[materials]
+EW = { kind = "isotropic", E = "40 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "100 J/m^2" }
+[[edges]]
+side = "top"
+velocity = ["0 m/s", "1 mm/min"]
+[[edges]]
+side = "bottom"
+velocity = ["0 m/s", "0 m/s"]
+[[cracks]]
+points = [["10 mm", "5 mm"], ["7.5 mm", "5 mm"]]
+grows = "end"
+advance = "1 mm"
+direction = "straight"
+[solver]
+strain = "small"
+[measure]
+force = "top"
+displacement = "top"
+[stop]
+displacement = "2 mm"
+)",
+                                    "parted.toml");
+    const Record record = simulate(scene);
+    const auto peak = std::ranges::max_element(record.series, {}, &Instant::force);
+    Study study;
+    Experiment& test = study.experiments.emplace_back();
+    test.name = "parted";
+    test.scene = scene;
+    test.noise.force = 1.0;
+    std::mt19937 generator(1);
+    std::normal_distribution<double> normal;
+    for (int i = 1; i <= 30; ++i) {
+        const double part = i / 28.15;  // of the displacement at the peak; that at the end is 2 % more
+        test.data.displacement.push_back(part * peak->displacement);
+        test.data.force.push_back((part < 1 ? part * peak->force : 0.0) + normal(generator));
+    }
+    EXPECT_GT(29 / 28.15 * peak->displacement, record.series.back().displacement);
+    study.parameters = {toughness_parameter("EW", 80), bar_modulus()};
+    study.parameters[1].initial = 30e6, study.parameters[1].lower = 10e6, study.parameters[1].upper = 100e6;
+    study.parameters[1].scale = Scale::logarithmic;
+    for (const double initial : {30.0, 80.0, 250.0}) {
+        study.parameters[0].initial = initial;
+        const Fit fit = fit_study(study);
+        const FittedParameter& toughness = fit.parameters[0];
+        EXPECT_EQ(fit.status, FitStatus::converged) << fit.message;
+        EXPECT_NEAR(toughness.value, 100, 4) << initial;
+        EXPECT_LT(toughness.lower_95, 100) << initial;
+        EXPECT_GT(toughness.upper_95, 100) << initial;
+        EXPECT_LT(toughness.upper_95 - toughness.lower_95, 15) << initial;
+        EXPECT_NEAR(fit.parameters[1].value, 40, 0.6) << initial;
+    }
 }
 
 // What data and prior say together is their weighted mean, however far apart they are: the prior tells nothing of what the model

@@ -386,7 +386,11 @@ TEST(UnitCloseLook, AProfileThatNoRunConfirmsEndsNothing) {
     const auto believed = look_close(objective, {near, true, 1}, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
     ASSERT_TRUE(believed);
     EXPECT_LT(believed->uncertainty.upper_95[0] - believed->uncertainty.lower_95[0], 0.9);
-    const auto look = look_close(objective, {near, false, 1}, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
+    const auto lowest_held = [&](const VectorXd& start, Eigen::Index held) {
+        const VectorXd there = VectorXd::Constant(2, start[held]);
+        return std::optional(crampfit::Run{there, objective.at(there)});
+    };
+    const auto look = look_close(objective, {near, false, 1, lowest_held}, Vector2d(0.5, 0.5), {{30}}, {"a", "b"}, 1);
     ASSERT_TRUE(look);
     EXPECT_NE(look->uncertainty.message.find("'a' and 'b' cannot be told apart"), std::string::npos) << look->uncertainty.message;
     for (int j = 0; j < 2; ++j) {

@@ -1,5 +1,7 @@
 #include "inverse/sensitivity.hpp"
 #include "datasets/error.hpp"
+#include "datasets/keys.hpp"
+#include "forward/simulate.hpp"
 #include "inverse/local_design.hpp"
 #include "inverse/morris.hpp"
 #include "inverse/outputs.hpp"
@@ -313,6 +315,77 @@ TEST(SystemSensitivity, GivesTheSameBitsForAnyNumberOfThreadsAndCountsFailedRuns
         }
         if (method == SensitivityMethod::sobol) {
             EXPECT_NE(one.message.find("runs failed and are left out; the first: lost"), std::string::npos) << one.message;
+        }
+    }
+}
+
+// Where a rest ends lies between rows of the record, which stand at the same displacements whatever the wood.
+TEST(GradientSensitivity, EndsOfRestsMoveAsRunsSay) {
+    Study study;
+    study.scene = parse_scene(R"(
+[model]
+plane = "strain"
+thickness = "10 mm"
+cell = "0.5 mm"
+[specimen]
+size = ["12 mm", "10 mm"]
+rings = { pith = ["-200.5 mm", "5 mm"], period = "4 mm", latewood_fraction = 0.3 }
+[materials]
+EW = { kind = "isotropic", E = "40 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "110 J/m^2" }
+LW = { kind = "isotropic", E = "800 MPa", nu = 0.33, density = "750 kg/m^3", toughness = "180 J/m^2" }
+[[edges]]
+name = "up"
+side = "top"
+range = ["0.5 mm", "1.5 mm"]
+velocity = ["0 m/s", "1 mm/min"]
+[[edges]]
+side = "bottom"
+range = ["0.5 mm", "1.5 mm"]
+velocity = ["0 m/s", "0 m/s"]
+[[cracks]]
+points = [["0 mm", "5 mm"], ["2.5 mm", "5 mm"]]
+grows = "end"
+advance = "0.5 mm"
+direction = "straight"
+[measure]
+force = "up"
+displacement = "up"
+[solver]
+strain = "small"
+[stop]
+displacement = "1.2 mm"
+)",
+                              "pull.toml");
+    for (const char* key : {"EW.E", "LW.E", "EW.toughness", "LW.toughness"}) {
+        Parameter& parameter = study.parameters.emplace_back();
+        parameter.name = key;
+        parameter.keys = {std::string("materials.") + key};
+        parameter.initial = get_number(*study.scene, parameter.keys[0]);
+        parameter.lower = parameter.initial / 2;
+        parameter.upper = parameter.initial * 2;
+        parameter.scale = Scale::logarithmic;
+    }
+    study.outputs = {{"arrest length 1", StudyOutput::Kind::arrest_length, 0, 1},
+                     {"arrest displacement 1", StudyOutput::Kind::arrest_displacement, 0, 1}};
+    study.sensitivity = {SensitivityMethod::local, 0};
+    const Sensitivity result = study_sensitivity(study, {});
+    constexpr double step = 1e-3;
+    const Record here = simulate(*study.scene);
+    for (const Parameter& parameter : study.parameters) {
+        const auto with = [&](double factor) {
+            Scene scene = *study.scene;
+            set_number(scene, parameter.keys[0], factor * parameter.initial);
+            return simulate(scene);
+        };
+        const Record less = with(1 - step), more = with(1 + step);
+        for (const SensitivityIndex& index : result.indices) {
+            if (index.kind != "elasticity" || index.parameter != parameter.name) continue;
+            const auto& output = *std::ranges::find(study.outputs, index.output, &StudyOutput::name);
+            const double seen = (output_of(more, output) - output_of(less, output)) / (2 * step * output_of(here, output));
+            std::printf("%s by %s: elasticity %.5f, by runs %.5f\n", index.output.c_str(), parameter.name.c_str(), index.value,
+                        seen);
+            EXPECT_NEAR(index.value, seen, 1e-4 + 1e-2 * std::abs(seen));
+            EXPECT_NE(index.value, 0.0);
         }
     }
 }

@@ -1,6 +1,7 @@
 #include "inverse/uncertainty.hpp"
 #include "inverse/differences.hpp"
 #include "inverse/fit.hpp"
+#include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 namespace crampfit::testing {
 namespace {
@@ -44,6 +46,50 @@ TEST(SystemUncertainty, NamesParametersThatCannotBeToldApart) {
             EXPECT_TRUE(std::isfinite(parameter.standard_error));
         }
         EXPECT_LT(fit.correlation(0, 1), -0.99);
+    }
+}
+
+// Layers of a bar in series: all that can be measured is 0.7 / E_EW + 0.3 / E_LW. LW is so stiff that its modulus does little;
+// yet from one of its bounds to the other that of EW goes from 54 to 70 MPa.
+TEST(SystemUncertainty, WhatFollowsAParameterThatCannotBeToldIsNoSurerThanThat) {
+    constexpr double share = 0.3, compliance = (1 - share) / 55e6 + share / 900e6;
+    const auto follows = [](double latewood) { return (1 - share) / (compliance - share / latewood) / 1e6; };
+    Experiment bar;
+    bar.name = "bar";
+    bar.scene = bar_scene();
+    bar.scene.model.cell = 1e-3;
+    bar.scene.specimen.material.clear();
+    bar.scene.specimen.rings = Rings{{5e-3, -200.0}, 10e-3, share, 0.0};
+    bar.scene.materials["LW"] = {900e6, 0.0, 900, 100};
+    std::mt19937 generator(1);
+    std::normal_distribution<double> normal(0.0, 0.1);
+    for (int i = 1; i <= 100; ++i) {
+        const double u = 0.1e-3 * i / 100;
+        bar.data.displacement.push_back(u);
+        bar.data.force.push_back(5e-3 / compliance * u + normal(generator));
+    }
+    bar.noise.force = 0.1;
+    Study study;
+    study.experiments = {bar};
+    study.uncertainty = {.profile = true, .posterior = 0};
+    for (const char* wood : {"EW", "LW"}) {
+        Parameter& parameter = study.parameters.emplace_back(bar_modulus());
+        parameter.name = wood;
+        parameter.keys = {std::string("materials.") + wood + ".E"};
+        parameter.scale = Scale::logarithmic;
+    }
+    study.parameters[0].initial = 30e6, study.parameters[0].lower = 10e6, study.parameters[0].upper = 200e6;
+    study.parameters[1].initial = 600e6, study.parameters[1].lower = 100e6, study.parameters[1].upper = 5000e6;
+    for (const char* method : {"auto", "ceres"}) {
+        study.optimizer.method = method;
+        const Fit fit = fit_study(study);
+        EXPECT_NE(fit.message.find("'LW' cannot be told from this data"), std::string::npos) << fit.message;
+        EXPECT_NE(fit.message.find("'EW' must follow"), std::string::npos) << fit.message;
+        EXPECT_NEAR(fit.parameters[0].lower_95, follows(5000e6), 0.5) << method;
+        EXPECT_NEAR(fit.parameters[0].upper_95, follows(100e6), 0.5) << method;
+        EXPECT_NEAR(fit.parameters[1].lower_95, 100, 1e-9) << method;
+        EXPECT_NEAR(fit.parameters[1].upper_95, 5000, 1e-9) << method;
+        EXPECT_TRUE(fit.profile.empty());  // what derivatives at the best point tell does not reach so far
     }
 }
 
