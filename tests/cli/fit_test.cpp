@@ -106,7 +106,13 @@ TEST(SystemCommand, BadStudyIsStatusTwoAndNamesFileAndKey) {
     EXPECT_EQ(outcome.status, 2);
     EXPECT_EQ(outcome.error.rfind("crampfit: error: ", 0), 0u) << outcome.error;
     EXPECT_TRUE(contains(outcome.error, "study.toml: optimizer.best")) << outcome.error;
-    EXPECT_FALSE(std::filesystem::exists(command.path("fit.h5")));
+
+    command.folder.write("study.toml", study(60));
+    command.folder.write("pull.csv", "displacement [mm],force [N]\n0.1,1\n0.05,2\n0.02,3\n");
+    const Outcome falls = command.run({"fit", command.path("study.toml"), "-o", command.path("fit.h5")});
+    EXPECT_EQ(falls.status, 2);
+    EXPECT_TRUE(contains(falls.error, "pull.csv: displacement")) << falls.error;
+    for (const char* file : {"fit.h5", "fit.h5.runs"}) EXPECT_FALSE(std::filesystem::exists(command.path(file))) << file;
 }
 
 // A fixture that gives way and begins loose: what it does to the curve takes no further run, and with its compliance given the

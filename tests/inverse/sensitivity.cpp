@@ -326,7 +326,7 @@ TEST(GradientSensitivity, EndsOfRestsMoveAsRunsSay) {
 [model]
 plane = "strain"
 thickness = "10 mm"
-cell = "0.5 mm"
+cell = "0.4 mm"
 [specimen]
 size = ["12 mm", "10 mm"]
 rings = { pith = ["-200.5 mm", "5 mm"], period = "4 mm", latewood_fraction = 0.3 }
@@ -336,16 +336,16 @@ LW = { kind = "isotropic", E = "800 MPa", nu = 0.33, density = "750 kg/m^3", tou
 [[edges]]
 name = "up"
 side = "top"
-range = ["0.5 mm", "1.5 mm"]
+range = ["0.4 mm", "1.6 mm"]
 velocity = ["0 m/s", "1 mm/min"]
 [[edges]]
 side = "bottom"
-range = ["0.5 mm", "1.5 mm"]
+range = ["0.4 mm", "1.6 mm"]
 velocity = ["0 m/s", "0 m/s"]
 [[cracks]]
 points = [["0 mm", "5 mm"], ["2.5 mm", "5 mm"]]
 grows = "end"
-advance = "0.5 mm"
+advance = "0.4 mm"
 direction = "straight"
 [measure]
 force = "up"
