@@ -203,11 +203,12 @@ class March {
     Record fail(double time) {
         const bool plastic = std::any_of(materials_.materials().begin(), materials_.materials().end(),
                                          [](const Material& m) { return m.plastic; });
-        if (record_.series.size() <= 1 && outcome_ == Equilibrium::Outcome::mechanism && !plastic)
+        if (record_.series.size() <= 1 && outcome_ == Equilibrium::Outcome::mechanism && !plastic && !plan_.friction)
             throw InputError(scene_.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
         record_.status = RunStatus::unstable;
         record_.message = "no equilibrium was found at " + std::to_string(time) + " s" +
-                          (plastic ? "; the load may be more than the wood can carry" : "") + advice_on_holds(scene_);
+                          (plastic ? "; the load may be more than the wood can carry" : "") +
+                          (plan_.friction ? "; the load may be more than friction can hold" : "") + advice_on_holds(scene_);
         if (record_.series.empty()) save_row();
         return finish();
     }
