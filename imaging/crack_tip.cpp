@@ -7,16 +7,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace crampfit {
 namespace {
 
-constexpr int terms = 14;                // of the series, for each component
+constexpr int terms = 14;                // of the series up to n = 4, for each component
+constexpr int more_terms = 22;           // up to n = 6
 constexpr int smooth_terms = 10;         // of a polynomial of third degree
 constexpr double unit = 100;             // length that r is counted in, so that the terms are of like size [px]
 constexpr int scan_points = 500;         // of the field that take part in the coarse search
@@ -24,7 +27,8 @@ constexpr int scan_places = 13;          // along the longer side of the field
 constexpr int scan_angles = 16;          // around the circle
 constexpr int ring_subsets = 6;          // outer radius of the ring about the tip, in subsets
 constexpr double inner_share = 2.0 / 3;  // of that, of the ring that tells how much the tip depends on it
-constexpr int least_points = 60;         // four times the series' coefficients
+template <int count>
+constexpr int least_points = 4 * count + 4;  // of the series' terms
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
 // without a crack reach some 10.
 constexpr double least_gain = 50;
@@ -43,8 +47,8 @@ constexpr double most_damping = 1e8;
 constexpr double as_good = 1.1;  // a score by that factor above the best may be chance
 constexpr double widest_turn = 60.0 * std::numbers::pi / 180.0;
 
-using Term = Eigen::RowVector<double, terms>;
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, terms>;
+template <int count>
+using Term = Eigen::RowVector<double, count>;
 using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 2>;
 
 struct Sample {
@@ -65,28 +69,27 @@ struct Line {
 };
 
 /// All terms of the series at a place, the tip at the origin and the crack along the negative x axis.
-Term series(const Vec2& place) {
+template <int count>
+Term<count> series(const Vec2& place) {
+    static_assert(count == terms || count == more_terms);
     const double r = place.norm() / unit;
-    if (r == 0) return Term::Zero();
-    // cos and sin of theta, theta / 2 and 3 theta / 2 without an angle: half angles by their squares, others by sums.
+    if (r == 0) return Term<count>::Zero();
+    // cos and sin of multiples of theta / 2 without an angle: half angles by their squares, others by sums.
     const double c = place.x() / (r * unit), s = place.y() / (r * unit);
     const double ch = std::sqrt(std::max(0.0, (1 + c) / 2)), sh = std::copysign(std::sqrt(std::max(0.0, (1 - c) / 2)), s);
     const double c3 = c * ch - s * sh, s3 = s * ch + c * sh;
+    const double c2 = c * c - s * s, s2 = 2 * s * c;
     const double root = std::sqrt(r), root3 = r * root;
-    return {1,
-            root * ch,
-            root * sh,
-            root * c3,
-            root * s3,
-            r * c,
-            r * s,
-            root3 * c3,
-            root3 * s3,
-            root3 * ch,
-            root3 * sh,
-            r * r,
-            r * r * (c * c - s * s),
-            2 * r * r * c * s};
+    Term<count> term;
+    term.template head<terms>() << 1, root * ch, root * sh, root * c3, root * s3, r * c, r * s, root3 * c3, root3 * s3,
+        root3 * ch, root3 * sh, r * r, r * r * c2, r * r * s2;
+    if constexpr (count == more_terms) {
+        const double root5 = r * root3, r3 = r * r * r;
+        const double c5 = c2 * ch - s2 * sh, s5 = s2 * ch + c2 * sh;
+        term.template tail<more_terms - terms>() << root5 * c5, root5 * s5, root5 * ch, root5 * sh, r3 * (c2 * c - s2 * s),
+            r3 * (s2 * c + c2 * s), r3 * c, r3 * s;
+    }
+    return term;
 }
 
 /// Half the width of the strip about a crack in which subsets reach over it [px].
@@ -114,12 +117,13 @@ std::vector<Sample> clear_of(const std::vector<Sample>& samples, const Line& lin
 }
 
 /// What the series with its best coefficients leaves of the displacements [px].
+template <int count>
 Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
-    Rows rows(samples.size(), terms);
+    Eigen::Matrix<double, Eigen::Dynamic, count> rows(samples.size(), count);
     Displacements right(samples.size(), 2);
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
         const Sample& sample = samples[static_cast<std::size_t>(i)];
-        rows.row(i) = series(line.local(sample.place));
+        rows.row(i) = series<count>(line.local(sample.place));
         right.row(i) = sample.displacement.transpose();
     }
     return right - rows * rows.householderQr().solve(right);
@@ -127,24 +131,25 @@ Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
 
 /// Mean square of what is left, for each degree of freedom [px^2]; by normal equations, quick and exact enough to
 /// compare. Points nearer to the tip than `about_tip` and to the crack than `about_crack` take no part [px].
+template <int count>
 double scan_score(const std::vector<Sample>& samples, const Line& line, double about_tip, double about_crack) {
-    Eigen::Matrix<double, terms, terms> normal = Eigen::Matrix<double, terms, terms>::Zero();
-    Eigen::Matrix<double, terms, 2> right = Eigen::Matrix<double, terms, 2>::Zero();
+    Eigen::Matrix<double, count, count> normal = Eigen::Matrix<double, count, count>::Zero();
+    Eigen::Matrix<double, count, 2> right = Eigen::Matrix<double, count, 2>::Zero();
     double squares = 0;
-    int count = 0;
+    int points = 0;
     for (const Sample& sample : samples) {
         const Vec2 local = line.local(sample.place);
         if (local.norm() < about_tip || (local.x() < 0 && std::abs(local.y()) < about_crack)) continue;
-        const Term term = series(local);
-        normal.selfadjointView<Eigen::Lower>().rankUpdate(term.transpose());
+        const Term<count> term = series<count>(local);
+        normal.template selfadjointView<Eigen::Lower>().rankUpdate(term.transpose());
         right += term.transpose() * sample.displacement.transpose();
         squares += sample.displacement.squaredNorm();
-        ++count;
+        ++points;
     }
-    if (count < least_points) return std::numeric_limits<double>::infinity();
-    const auto factor = normal.selfadjointView<Eigen::Lower>().ldlt();
+    if (points < least_points<count>) return std::numeric_limits<double>::infinity();
+    const auto factor = normal.template selfadjointView<Eigen::Lower>().ldlt();
     const double left = squares - right.cwiseProduct(factor.solve(right)).sum();
-    return std::isfinite(left) ? left / (2 * (count - terms)) : std::numeric_limits<double>::infinity();
+    return std::isfinite(left) ? left / (2 * (points - count)) : std::numeric_limits<double>::infinity();
 }
 
 /// Places whose subsets were torn, as a crack does it: many beside each other. Others are lost here and there.
@@ -277,7 +282,7 @@ Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subse
             for (int turn = 0; turn < scan_angles; ++turn) {
                 const Line line{{lattice.first_x + x, lattice.first_y + y}, 2 * std::numbers::pi * turn / scan_angles};
                 const double width = clearance(subset, line.angle);
-                if (const double score = scan_score(samples, line, width, width); score < least) {
+                if (const double score = scan_score<terms>(samples, line, width, width); score < least) {
                     least = score;
                     best = line;
                 }
@@ -289,12 +294,14 @@ Line scan(const std::vector<Sample>& all, const PointLattice& lattice, int subse
 /// point on the wrong side of the crack is not. Here subsets that reach over the crack take part, so that no direction
 /// can hide such points in a strip; the direction is the middle of those that are about as good as the best, as no
 /// point may lie between them. The best is within `range`, those about as good within `widest`.
-void turn(const std::vector<Sample>& samples, Line& line, int subset, double range, double widest) {
+/// Gives half the width of the range in which they are [rad].
+template <int count>
+double turn(const std::vector<Sample>& samples, Line& line, int subset, double range, double widest) {
     constexpr int reach = 12;  // steps
     const double step = range / reach;
     const int farthest = static_cast<int>(std::lround(widest / step));
     const auto score = [&](int i) {
-        return scan_score(samples, {line.tip, line.angle + i * step}, clearance(subset, line.angle), 0);
+        return scan_score<count>(samples, {line.tip, line.angle + i * step}, clearance(subset, line.angle), 0);
     };
     int best = -reach;
     double least = score(best);
@@ -307,12 +314,14 @@ void turn(const std::vector<Sample>& samples, Line& line, int subset, double ran
     while (first > -farthest && score(first - 1) <= as_good * least) --first;
     while (last < farthest && score(last + 1) <= as_good * least) ++last;
     line.angle += 0.5 * (first + last) * step;
+    return 0.5 * (last - first + 1) * step;
 }
 
 /// Levenberg-Marquardt over the tip, the coefficients of the series eliminated (variable projection, Golub and Pereyra
 /// 1973), derivatives by central differences. Gives the tip's covariance, were the displacements independent [px^2].
+template <int count>
 Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
-    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd { return residuals(samples, {tip, line.angle}).reshaped(); };
+    const auto left = [&](const Vec2& tip) -> Eigen::VectorXd { return residuals<count>(samples, {tip, line.angle}).reshaped(); };
     Eigen::VectorXd now = left(line.tip);
     double damping = 1e-3;
     Eigen::Matrix2d normal;
@@ -337,7 +346,30 @@ Eigen::Matrix2d refine(const std::vector<Sample>& samples, Line& line) {
             damping *= 8;
         }
     }
-    return now.squaredNorm() / static_cast<double>(now.size() - 2 * terms - 2) * normal.inverse();
+    return now.squaredNorm() / static_cast<double>(now.size() - 2 * count - 2) * normal.inverse();
+}
+
+struct Fitted {
+    Line line;
+    Eigen::Matrix2d covariance;  // of the tip, were the displacements independent [px^2]
+    double turned = 0;           // half width of the directions that are as good [rad]
+};
+
+/// The points that take part depend on the line, and the line on them: some rounds, of points within a radius [px] and of
+/// directions within a range [degrees]. Absent where too few points are left.
+template <int count>
+std::optional<Fitted> fit_in_rounds(const std::vector<Sample>& samples, const Line& from, int subset,
+                                    std::initializer_list<std::pair<double, double>> rounds) {
+    constexpr double degree = std::numbers::pi / 180;
+    Fitted fitted{from, Eigen::Matrix2d::Zero()};
+    for (const auto& [radius, range] : rounds) {
+        const double widest = std::isfinite(radius) ? widest_turn : range * degree;
+        fitted.turned = turn<count>(within(samples, fitted.line.tip, radius), fitted.line, subset, range * degree, widest);
+        const std::vector<Sample> clear = clear_of(within(samples, fitted.line.tip, radius), fitted.line, subset);
+        if (static_cast<int>(clear.size()) < least_points<count>) return std::nullopt;
+        fitted.covariance = refine<count>(clear, fitted.line);
+    }
+    return fitted;
 }
 
 /// How much better the series is than a polynomial: F statistic of what its jump and singularity take off.
@@ -352,9 +384,18 @@ double gain(const std::vector<Sample>& samples, const Line& line) {
         right.row(i) = sample.displacement.transpose();
     }
     const double smooth = (right - rows * rows.householderQr().solve(right)).squaredNorm();
-    const double cracked = residuals(samples, line).squaredNorm();
+    const double cracked = residuals<terms>(samples, line).squaredNorm();
     const double freedom = 2.0 * static_cast<double>(rows.rows() - terms);
     return (smooth - cracked) / (2 * (terms - smooth_terms)) / (cracked / freedom);
+}
+
+/// Whether the terms from n = 5 on take off more than noise gives them, of which so many neighbours share the same.
+bool has_more(const std::vector<Sample>& samples, const Line& line, double overlap) {
+    constexpr double least = 3;  // times what noise gives on the average
+    const double without = residuals<terms>(samples, line).squaredNorm(),
+                 with = residuals<more_terms>(samples, line).squaredNorm();
+    const double freedom = 2.0 * static_cast<double>(samples.size()) - 2 * more_terms;
+    return freedom > 0 && (without - with) / (2 * (more_terms - terms)) > least * overlap * with / freedom;
 }
 
 /// Length of the crack's line from the picture's border to the tip [px].
@@ -393,22 +434,24 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     const std::vector<Sample> samples = followed(lattice, field);
     CrackTip found;
     found.status = TipStatus::too_few_points;
-    if (static_cast<int>(samples.size()) < 2 * least_points) return found;
+    if (static_cast<int>(samples.size()) < 2 * least_points<terms>) return found;
 
-    Line line = scan(samples, lattice, geometry.subset);
-    Eigen::Matrix2d covariance;
-    // The points that take part depend on the line, and the line on them: a few rounds, first over all, then over the
-    // ring.
     constexpr double everywhere = std::numeric_limits<double>::infinity();
     const double ring = ring_subsets * geometry.subset;
-    constexpr double degree = std::numbers::pi / 180;
-    for (const auto& [radius, range] :
-         {std::pair{everywhere, 12 * degree}, {everywhere, 6 * degree}, {ring, 3 * degree}, {ring, 2 * degree}}) {
-        turn(within(samples, line.tip, radius), line, geometry.subset, range, radius == ring ? widest_turn : range);
-        const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, geometry.subset);
-        if (static_cast<int>(clear.size()) < least_points) return found;
-        covariance = refine(clear, line);
+    const Line first = scan(samples, lattice, geometry.subset);
+    auto fitted =
+        fit_in_rounds<terms>(samples, first, geometry.subset, {{everywhere, 12}, {everywhere, 6}, {ring, 3}, {ring, 2}});
+    if (!fitted) return found;
+    // Neighbouring subsets see the same pixels: as many points are independent as subsets lie side by side.
+    const double overlap = std::max(1.0, std::pow(static_cast<double>(geometry.subset) / lattice.step, 2));
+    // Where the specimen's sides are near, the field goes on beyond what the terms up to n = 4 can say.
+    bool goes_on = false;
+    if (has_more(clear_of(within(samples, fitted->line.tip, ring), fitted->line, geometry.subset), fitted->line, overlap)) {
+        const auto more = fit_in_rounds<more_terms>(samples, fitted->line, geometry.subset, {{ring, 3}, {ring, 2}});
+        goes_on = more.has_value();
+        if (goes_on) fitted = more;
     }
+    Line line = fitted->line;
     // Torn subsets without a motion apart are shadows, dust and the like.
     if (!(gain(clear_of(samples, line, geometry.subset), line) > least_gain)) {
         found.status = TipStatus::no_crack;
@@ -431,7 +474,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     const bool inside =
         line.tip.x() >= 0 && line.tip.x() <= geometry.columns - 1 && line.tip.y() >= 0 && line.tip.y() <= geometry.rows - 1;
     const std::vector<Sample> clear = clear_of(samples, line, geometry.subset);
-    if (static_cast<int>(clear.size()) < least_points) return found;
+    if (static_cast<int>(clear.size()) < least_points<terms>) return found;
     if (!(gain(clear, line) > least_gain)) {
         found.status = TipStatus::no_crack;
         return found;
@@ -440,24 +483,36 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         found.status = TipStatus::outside;
         return found;
     }
-    const Vec2 d = line.direction();
-    // What the series misses is no noise: its neighbours go along with it, and a smaller ring about the tip would say another
-    // place.
-    double model_error = 0;
-    if (const std::vector<Sample> nearer = clear_of(within(samples, line.tip, inner_share * ring), line, geometry.subset);
-        static_cast<int>(nearer.size()) >= least_points) {
-        Line again = line;
-        refine(nearer, again);
-        model_error = d.dot(again.tip - line.tip);
-    }
-    // Neighbouring subsets see the same pixels: as many points are independent as subsets lie side by side.
-    const double overlap = std::max(1.0, std::pow(static_cast<double>(geometry.subset) / lattice.step, 2));
     found.status = TipStatus::ok;
     found.tip = line.tip;
     found.angle = std::remainder(line.angle, 2 * std::numbers::pi);
-    found.length = length_in_picture(line, geometry.columns, geometry.rows);
-    found.sigma =
-        missed ? end_error(samples, line, geometry.subset) : std::hypot(std::sqrt(overlap * d.dot(covariance * d)), model_error);
+    const auto length = [&](const Vec2& moved, double turned) {
+        return length_in_picture({line.tip + moved, line.angle + turned}, geometry.columns, geometry.rows);
+    };
+    found.length = length(Vec2::Zero(), 0);
+    if (missed) {
+        found.along = found.sigma = end_error(samples, line, geometry.subset);
+        return found;
+    }
+    const Vec2 by_tip(0.5 * (length({1, 0}, 0) - length({-1, 0}, 0)), 0.5 * (length({0, 1}, 0) - length({0, -1}, 0)));
+    // What the series misses is no noise: its neighbours go along with it, and a smaller ring about the tip would say another
+    // place.
+    Vec2 model_error = Vec2::Zero();
+    const std::vector<Sample> nearer = clear_of(within(samples, line.tip, inner_share * ring), line, geometry.subset);
+    if (static_cast<int>(nearer.size()) >= (goes_on ? least_points<more_terms> : least_points<terms>)) {
+        Line again = line;
+        goes_on ? refine<more_terms>(nearer, again) : refine<terms>(nearer, again);
+        model_error = again.tip - line.tip;
+    }
+    // On either side the nearest whole subsets, which are a step of the lattice apart, end the directions that are as good.
+    const double turned =
+        std::min(fitted->turned / std::sqrt(3.0), lattice.step / (std::sqrt(24.0) * std::min(ring, found.length)));
+    const double turn_error = 0.5 * (length(Vec2::Zero(), turned) - length(Vec2::Zero(), -turned));
+    const auto error = [&](const Vec2& by) {
+        return std::hypot(std::sqrt(overlap * by.dot(fitted->covariance * by)), by.dot(model_error));
+    };
+    found.along = error(line.direction());
+    found.sigma = std::hypot(error(by_tip), turn_error);
     return found;
 }
 

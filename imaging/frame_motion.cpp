@@ -55,12 +55,16 @@ Eigen::Vector2i FrameMotion::bin_of(const Vec2& place) const {
     return bin.cwiseMax(Vec2::Zero()).cwiseMin((bins_.array() - 1).cast<double>().matrix()).cast<int>();
 }
 
-bool FrameMotion::parted(const Vec2& a, const Vec2& b, const std::vector<int>& segments) const {
+// Of points on a crack rounding has said to which side they belong: they are left out.
+bool FrameMotion::parted(const Vec2& place, const Vec2& point, const std::vector<int>& segments) const {
+    constexpr double hair = 1e-3;  // of a point
     return std::ranges::any_of(segments, [&](int k) {
         const auto& [from, to] = segments_[static_cast<std::size_t>(k)];
         const Vec2 along = to - from;
-        return (cross(along, a - from) >= 0) != (cross(along, b - from) >= 0) &&
-               (cross(b - a, from - a) >= 0) != (cross(b - a, to - a) >= 0);
+        const bool crosses = (cross(along, place - from) >= 0) != (cross(along, point - from) >= 0) &&
+                             (cross(point - place, from - place) >= 0) != (cross(point - place, to - place) >= 0);
+        const double share = std::clamp((point - from).dot(along) / std::max(along.squaredNorm(), 1e-300), 0.0, 1.0);
+        return crosses || (from + share * along - point).norm() < hair * size_.minCoeff();
     });
 }
 

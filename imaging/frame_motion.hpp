@@ -27,7 +27,7 @@ class FrameMotion {
     };
 
     Eigen::Vector2i bin_of(const Vec2& place) const;
-    bool parted(const Vec2& a, const Vec2& b, const std::vector<int>& segments) const;
+    bool parted(const Vec2& place, const Vec2& point, const std::vector<int>& segments) const;
     std::vector<int> segments_near(const Eigen::Vector2i& bin, int reach) const;
 
     std::vector<Vec2> places_;               // [m]

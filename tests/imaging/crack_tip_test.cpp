@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
 #include <cstdio>
 
 using namespace crampfit;
@@ -95,6 +96,39 @@ TEST(VerificationCrackTip, SmallOpeningsAndNoise) {
                     error.y(), tip.sigma);
         EXPECT_LT(error.norm(), subset / 2);
         EXPECT_LT(std::abs(error.x()), 3 * tip.sigma + 1);
+    }
+}
+
+// A crack whose other tip is not far off: a field that four orders of the series do not hold (Westergaard 1939). To the left of
+// the picture its line goes on.
+TEST(VerificationCrackTip, WithAnotherTipNotFarOff) {
+    VirtualCameraOptions options;
+    options.columns = 480;
+    options.rows = 480;
+    VirtualTest test(options);
+    const double half = 130, opening = 3;  // [px]; the second at the middle
+    for (const double angle : {0.0, -0.52, 0.79}) {
+        const Vec2 truth(165.3, 240.6), along(std::cos(angle), std::sin(angle)), across(-along.y(), along.x());
+        const auto displacement = [&](const Vec2& place) -> Vec2 {
+            constexpr double kappa = 2;
+            const Vec2 from = place - truth + half * along;
+            const std::complex<double> z(along.dot(from), across.dot(from));
+            const std::complex<double> root = std::sqrt(z - half) * std::sqrt(z + half), Z = z / root;
+            const double size = opening / (half * (kappa + 1));
+            const double u = size * (0.5 * (kappa - 1) * root.real() - z.imag() * Z.imag());
+            const double v = size * (0.5 * (kappa + 1) * root.imag() - z.imag() * Z.real());
+            return u * along + v * across;
+        };
+        const CrackTip tip = test.tip(displacement);
+        ASSERT_EQ(tip.status, TipStatus::ok) << angle;
+        const double length = truth.x() / std::cos(angle) + 0.5 / std::cos(angle);
+        const Vec2 error = tip.tip - truth;
+        std::printf(
+            "other tip %.0f px behind, angle %.2f: off by %.2f px along, %.2f px across, length off by %.2f px, said %.2f px\n",
+            2 * half, angle, along.dot(error), across.dot(error), tip.length - length, tip.sigma);
+        EXPECT_LT(error.norm(), 3);
+        EXPECT_LT(std::abs(tip.length - length), 3);
+        EXPECT_LT(std::abs(tip.length - length), 3 * tip.sigma + 1);
     }
 }
 
