@@ -38,6 +38,9 @@ double splitting_motion(const Scene& scene, const Discretisation& body);
 /// empty.
 std::string advice_on_holds(const Scene& scene);
 
+/// What an end without equilibrium says where friction holds the specimen.
+inline constexpr const char* friction_may_slip = "; the load may be more than friction can hold";
+
 /// Whether there is a traction, or a force on a body, which do not go with time.
 bool has_dead_load(const Scene& scene);
 

@@ -208,7 +208,8 @@ class March {
         record_.status = RunStatus::unstable;
         record_.message = "no equilibrium was found at " + std::to_string(time) + " s" +
                           (plastic ? "; the load may be more than the wood can carry" : "") +
-                          (plan_.friction ? "; the load may be more than friction can hold" : "") + advice_on_holds(scene_);
+                          (plan_.friction && outcome_ == Equilibrium::Outcome::mechanism ? friction_may_slip : "") +
+                          advice_on_holds(scene_);
         if (record_.series.empty()) save_row();
         return finish();
     }

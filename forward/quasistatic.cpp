@@ -89,7 +89,9 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     : Quasistatic(scene, plan, materials, body, numbers, threads, nullptr) {
     if (plan.extrapolates) coarse_ = std::make_unique<Coarse>(scene, plan, numbers, threads, *this);
     if (plan.linear ? know_linear(0) : know(0, 0) && know(0, 1)) return;
-    if (outcome_ == Equilibrium::Outcome::mechanism || (coarse() && coarse()->outcome_ == Equilibrium::Outcome::mechanism))
+    const bool is_loose =
+        outcome_ == Equilibrium::Outcome::mechanism || (coarse() && coarse()->outcome_ == Equilibrium::Outcome::mechanism);
+    if (is_loose && !plan.friction)  // which may hold a smaller load
         throw InputError(scene.file.string(), "edges", "too few", "the specimen can move as a whole: nothing holds it");
     fail();
 }
@@ -136,6 +138,7 @@ Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nul
 bool Quasistatic::fail() {
     failure_ = "no equilibrium was found";
     if (!plan_.linear && failed_time_ > 0) failure_ += fmt::format(" at {:.4g} s", time_of(failed_time_));
+    if (plan_.friction && outcome_ == Equilibrium::Outcome::mechanism) failure_ += friction_may_slip;
     return false;
 }
 

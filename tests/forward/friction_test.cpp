@@ -118,6 +118,27 @@ TEST(VerificationFriction, OnASlopeItSticksUpToTheFrictionAngle) {
     }
 }
 
+// The specimen is cut right through along a slope of 20 degrees, and pressed from above.
+TEST(VerificationFriction, ASlopeThatSlipsIsNoMistakeOfTheScene) {
+    for (const double friction : {0.36, 0.37}) {  // tan 20 degrees = 0.364
+        Scene scene = at_rest({20e-3, 20e-3}, 1e-3);
+        scene.edges = {pulled("top", Side::top, {0.0, -1e4}), moving("bottom", Side::bottom, {0.0, 0.0})};
+        Crack& cut = scene.cracks.emplace_back();
+        cut.points = {{-0.5e-3, 6.2783e-3}, {20.5e-3, 13.9217e-3}};
+        cut.faces = {CrackFaces::Kind::friction, friction};
+        scene.measure = {"top", "top"};
+        scene.stop = {};
+        scene.stop.time = 1.0;
+        scene.solver.kind = SolverKind::quasistatic;
+        const Record record = simulate(scene);
+        std::printf("slope of 20 degrees, friction %.2f: %s\n", friction, record.message.c_str());
+        EXPECT_EQ(record.status == RunStatus::finished, friction > 0.364);
+        if (friction < 0.364) {
+            EXPECT_NE(record.message.find("the load may be more than friction can hold"), std::string::npos);
+        }
+    }
+}
+
 Scene hertz(double friction, double nu, double cell, double size) {
     const double R = 2e-3;
     Scene scene = at_rest({2 * size, size}, cell);

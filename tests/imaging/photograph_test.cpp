@@ -1,5 +1,6 @@
 // Photographs on the axes of a specimen; its wood before the virtual camera.
 #include "datasets/error.hpp"
+#include "imaging/frame_motion.hpp"
 #include "imaging/photograph.hpp"
 #include "imaging/record_camera.hpp"
 #include "imaging/wood_surface.hpp"
@@ -110,4 +111,26 @@ TEST(UnitVirtualCamera, ANarrowGapDarkensAPixelByItsShare) {
     double missing = 0;
     for (int y = 0; y < 20; ++y) missing += 200.0 - picture.gray[static_cast<std::size_t>(y * 20 + 10)];
     EXPECT_EQ(missing, 19);
+}
+
+// A crack goes through points exactly, and rounding has said for each to which side it belongs.
+TEST(UnitFrameMotion, PointsOnACrackBelongToNeitherSide) {
+    Record record;
+    record.point_size = {0.1e-3, 0.1e-3};
+    Frame& frame = record.frames.emplace_back();
+    frame.crack = {{0.5e-3, 0.5e-3}, {2.5e-3, 2.5e-3}};
+    record.paths = {frame.crack};
+    const Eigen::Vector2f above(-1e-5F, 1e-5F), below(1e-5F, -1e-5F);
+    for (int j = 0; j < 30; ++j)
+        for (int i = 0; i < 30; ++i) {
+            record.point_position.emplace_back((i + 0.5) * 0.1e-3, (j + 0.5) * 0.1e-3);
+            frame.moved.push_back(j > i || (j == i && i % 3 == 0) ? above : below);
+        }
+    const FrameMotion motion(record, 0, "record.h5");
+    for (double along = 0.8e-3; along < 2.2e-3; along += 0.033e-3)
+        for (const double side : {1.0, -1.0}) {
+            const Vec2 moved = motion({along - side * 1e-6, along + side * 1e-6});
+            EXPECT_NEAR(moved.y(), side * 1e-5, 1e-9) << along;
+            EXPECT_NEAR(moved.x(), -side * 1e-5, 1e-9) << along;
+        }
 }
