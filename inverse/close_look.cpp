@@ -181,32 +181,39 @@ void follow_untold(CloseLook& look, const std::vector<std::string>& names, const
         }
     }
     Eigen::VectorXd least = x, most = x, ends_below = x, ends_above = x;
+    // What no run says may be as good.
+    const auto is_as_good = [&](Eigen::Index j, double at) {
+        Eigen::VectorXd start = x;
+        start[j] = at;
+        const auto there = near.lowest_held(start, j);
+        const bool is = !there || there->evaluation->misfit - u.best.evaluation->misfit <= u.rise[j];
+        if (there && is) {
+            least = least.cwiseMin(there->x);
+            most = most.cwiseMax(there->x);
+        }
+        return is;
+    };
+    struct Side {
+        Eigen::Index j;
+        double good;
+        double& end;
+    };
+    std::vector<Side> within;  // that end before the bound
     for (Eigen::Index j = 0; j < x.size(); ++j) {
         for (const double bound : {0.0, 1.0}) {
             double& end = bound < x[j] ? ends_below[j] : ends_above[j];
-            if (!is_untold[static_cast<std::size_t>(j)] || x[j] == bound) {
-                continue;
-            }
-            const auto is_as_good = [&](double at) {
-                Eigen::VectorXd start = x;
-                start[j] = at;
-                const auto there = near.lowest_held(start, j);
-                if (!there || there->evaluation->misfit - u.best.evaluation->misfit > u.rise[j]) {
-                    return false;
+            if (is_untold[static_cast<std::size_t>(j)] && x[j] != bound) {
+                end = bound;
+                if (!is_as_good(j, bound)) {
+                    within.push_back({j, x[j], end});
                 }
-                least = least.cwiseMin(there->x);
-                most = most.cwiseMax(there->x);
-                return true;
-            };
-            end = bound;
-            if (is_as_good(bound)) {
-                continue;
             }
-            double good = x[j];
-            for (int i = 0; i < halvings; ++i) {
-                const double middle = 0.5 * (good + end);
-                (is_as_good(middle) ? good : end) = middle;
-            }
+        }
+    }
+    for (int i = 0; i < halvings; ++i) {
+        for (Side& side : within) {
+            const double middle = 0.5 * (side.good + side.end);
+            (is_as_good(side.j, middle) ? side.good : side.end) = middle;
         }
     }
     std::vector<std::string> followers;

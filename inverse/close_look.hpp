@@ -35,7 +35,8 @@ struct NearRuns {
     Objective::Evaluate run;
     bool exact;   // else to first order in some parameters
     int threads;  // side by side; 1 where each depends on the one before in its last digits
-    /// What runs find lowest with one parameter held where a start has it. May be empty.
+    /// What runs find lowest with one parameter held where a start has it; absent where they have failed or been used up. May be
+    /// empty where `exact`.
     std::function<std::optional<Run>(const Eigen::VectorXd& start, Eigen::Index held)> lowest_held = {};
 };
 

@@ -31,7 +31,8 @@
 namespace crampfit {
 namespace {
 
-constexpr double bound_tolerance = 1e-4;  // of the box
+constexpr double bound_tolerance = 1e-4;   // of the box
+constexpr int held_runs_a_parameter = 10;  // at most, to follow what cannot be told; the table of runs does not hold them
 
 using Clock = std::chrono::steady_clock;
 
@@ -255,9 +256,16 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                 wide = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&, x] { return before.at(x); });
                 const std::vector<bool> exact = runs.walks().exact_near();
                 const bool all_exact = std::all_of(exact.begin(), exact.end(), [](bool one) { return one; });
-                const auto lowest_held = [&](const Eigen::VectorXd& start, Eigen::Index held) {
-                    Objective beside = objective.branch(objective.budget_left(), objective.threads());
-                    return descend_held(beside, runs.nearby(), start, held, options.seed);
+                int left = held_runs_a_parameter * static_cast<int>(box.size());
+                const auto lowest_held = [&, left](const Eigen::VectorXd& start,
+                                                   Eigen::Index held) mutable -> std::optional<Run> {
+                    if (left <= 0) {
+                        return std::nullopt;
+                    }
+                    Objective beside = objective.branch(left, objective.threads());
+                    const auto lowest = descend_held(beside, runs.nearby(), start, held, options.seed);
+                    left = beside.budget_left();
+                    return lowest;
                 };
                 const NearRuns near{runs.nearby().near(x), all_exact, runs.walks().depend_on_order() ? 1 : objective.threads(),
                                     lowest_held};

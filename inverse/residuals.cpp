@@ -379,6 +379,13 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
     const auto in_unit = [&](double sigma) { return fmt::format("{:.3g} {}", force ? sigma : 1e3 * sigma, force ? "N" : "mm"); };
     if (given) {
         noise_.push_back(fmt::format("{} {}", what, in_unit(*given)));
+        constexpr std::size_t enough = 30;  // rows
+        constexpr double too_much = 2;
+        if (const double seen = scatter(rows); rows.x().size() >= enough && seen > too_much * *given) {
+            remarks_.push_back(
+                fmt::format("{}: the rows of {} scatter by {} about their neighbours, {:.2g} times the noise that is given.",
+                            experiment.name, what, in_unit(seen), seen / *given));
+        }
         return *given;
     }
     const auto [low, high] = std::minmax_element(rows.y().begin(), rows.y().end());

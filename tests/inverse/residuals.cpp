@@ -485,6 +485,19 @@ TEST(UnitResiduals, NoiseThatIsNotGivenIsEstimatedAndSaidSo) {
     EXPECT_NE(comparison.remarks()[1].find("noise of crack_length"), std::string::npos);
 }
 
+TEST(UnitResiduals, NoiseThatIsGivenFarTooSmallIsTold) {
+    Experiment experiment = straight_experiment();
+    experiment.data = measure(straight(1e5, 8, 1e-3), 3.0, 0.1e-3, 7);
+    for (const double given : {1.0, 2.5, 6.0}) {
+        experiment.noise.force = given;
+        const Comparison comparison(experiment);
+        const bool told = std::ranges::any_of(comparison.remarks(), [](const std::string& remark) {
+            return remark.find("the rows of force scatter by") != std::string::npos;
+        });
+        EXPECT_EQ(told, given < 1.5) << given;
+    }
+}
+
 // That a crack stands says how tough the wood is at the least.
 TEST(UnitResiduals, ACrackThatStandsIsComparedByItsLength) {
     Experiment experiment = straight_experiment();
