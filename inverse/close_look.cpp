@@ -227,7 +227,7 @@ void follow_untold(CloseLook& look, const std::vector<std::string>& names, const
         }
     }
     take_intervals(u, lower, upper);
-    if (!followers.empty()) {
+    if (!followers.empty() && !u.untold.empty()) {
         u.message += fmt::format("As that goes to its bounds, {} must follow: runs tell how far, and intervals count it. ",
                                  fmt::join(followers, " and "));
     }
@@ -387,7 +387,7 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
         }
         profiled = look(wider(profiled->window, x));
     }
-    if (!near.exact && !all_told(found.uncertainty)) {
+    if (!near.exact && !found.uncertainty.untold.empty()) {
         follow_untold(found, names, near);
     }
     return found;
