@@ -108,9 +108,7 @@ double trust_in_intensities(const CrackTip& tip, const MaterialMap& materials, d
 
 // Nairn's opening is that just behind the tip. What the grid shows there swings by 3 degrees with the tip's place in a cell, as
 // points change sides; K_I and K_II, from a domain about the tip, tell it within 0.3. Near other wood, twice as stiff or half so,
-// it is the better one, and a crack must not turn at once where the one takes over from the other. (Were woods of 1.4 to 2.8
-// times the stiffness other woods in part, cracks along the jagged rings of a photograph would go 0.24 mm apart on two grids, not
-// 0.2.)
+// it is the better one, and a crack must not turn at once where the one takes over from the other.
 double normal_to_opening(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
     const double by_grid = normal_angle(tip, load.opening);
     const LocalWood wood = materials.at(tip.position);
@@ -172,7 +170,7 @@ Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad lo
     if (steered_by_intensities(criterion)) {
         // From wood of 1.4 to wood of 2.8 times the stiffness: no small change of a modulus, by which a pixel would count or not,
         // turns a crack.
-        const double trust = trust_in_intensities(tip, materials, increment, 1.5 * increment, 0.5, 1.5);
+        const double trust = trust_in_intensities(tip, materials, 0.75 * increment, 1.25 * increment, 0.5, 1.5);
         load.K_I = std::lerp(std::hypot(load.K_I, load.K_II), load.K_I, trust);
         load.K_II *= trust;
     }

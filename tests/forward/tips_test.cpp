@@ -195,8 +195,8 @@ double turn_beside(double distance, double ratio, const Vec2& ahead) {
 TEST(UnitGrowthDirection, NearBoundariesTheWayIsStraight) {
     for (const Vec2& ahead : {Vec2(1, 0), Vec2(0, 1)}) {
         for (const double side : {1.0, -1.0}) {
-            for (const double near : {0.1e-3, 0.49e-3}) EXPECT_NEAR(turn_beside(side * near, 10.0, ahead), 0.0, 0.01) << near;
-            EXPECT_NEAR(turn_beside(side * 0.76e-3, 10.0, ahead), -53.13, 0.01);
+            for (const double near : {0.1e-3, 0.37e-3}) EXPECT_NEAR(turn_beside(side * near, 10.0, ahead), 0.0, 0.01) << near;
+            EXPECT_NEAR(turn_beside(side * 0.63e-3, 10.0, ahead), -53.13, 0.01);
             EXPECT_NEAR(turn_beside(side * 0.1e-3, 1.4, ahead), -53.13, 0.01);
         }
     }
@@ -208,7 +208,7 @@ TEST(UnitGrowthDirection, NeitherStiffnessNorDistanceMakesTheWayJump) {
         for (int i = 0; i < 200; ++i) {
             const double ratio = std::pow(1.01, i);
             EXPECT_NEAR(turn_beside(0.3e-3, 1.01 * ratio, ahead), turn_beside(0.3e-3, ratio, ahead), 2.0) << ratio;
-            const double distance = 0.4e-3 + i * 2e-6;
+            const double distance = 0.3e-3 + i * 2e-6;
             EXPECT_NEAR(turn_beside(distance + 2e-6, 10.0, ahead), turn_beside(distance, 10.0, ahead), 1.0) << distance;
         }
     }
