@@ -13,6 +13,13 @@ namespace crampfit::cli {
 
 namespace {
 
+void check_times_of_images(const std::vector<double>& times, const std::filesystem::path& file) {
+    for (std::size_t i = 0; i < times.size(); ++i)
+        if (std::isnan(times[i]) || (i > 0 && times[i] < times[i - 1]))
+            throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", times[i]),
+                             "times of the images must not fall, and have no gaps");
+}
+
 /// A row for each image, in their order, its times without gaps and not falling.
 Curves read_times(const std::filesystem::path& file, std::size_t images) {
     Curves curves = read_curves(file);
@@ -22,10 +29,7 @@ Curves read_times(const std::filesystem::path& file, std::size_t images) {
             file.string(), "time", fmt::format("{} rows", times.size()),
             fmt::format("needs a column time [s] or displacement [mm] with a row for each of the {} images, in their order",
                         images));
-    for (std::size_t i = 0; i < curves.time.size(); ++i)
-        if (std::isnan(times[i]) || (i > 0 && times[i] < times[i - 1]))
-            throw InputError(file.string(), fmt::format("time, row {}", i + 1), fmt::format("{} s", times[i]),
-                             "times of the images must not fall, and have no gaps");
+    check_times_of_images(curves.time, file);
     return curves;
 }
 
@@ -34,8 +38,9 @@ PictureInstants read_load_at_images(const std::filesystem::path& file, std::size
     const Curves load = read_curves(file);
     const std::size_t rows = std::max({load.time.size(), load.displacement.size(), load.force.size()});
     if (rows != images)
-        throw InputError(file.string(), "", fmt::format("{} rows", rows),
-                         fmt::format("without --times the load needs a row for each of the {} images, in their order", images));
+        throw InputError(file.string(), "--load", fmt::format("{} rows", rows),
+                         fmt::format("without --times it needs a row for each of the {} images, in their order", images));
+    check_times_of_images(load.time, file);
     return {load.time, load.displacement, load.force, {}};
 }
 

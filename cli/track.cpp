@@ -44,7 +44,7 @@ class TipFinder {
         if (!by_fields_) return counted(gray_->tip(image));
         const DisplacementField field = correlator_.field(image);
         const CrackTip tip = find_crack_tip(geometry_, field);
-        if (!gray_ || (tip.status == TipStatus::ok && tip.along < well_known * geometry_.subset)) return tip;
+        if (!gray_ || (tip.status == TipStatus::ok && tip.tip_sigma < well_known * geometry_.subset)) return tip;
         const CrackTip by_gray = gray_->tip(image);
         return prefer_gray(tip, by_gray, field) ? counted(by_gray) : tip;
     }
@@ -62,9 +62,9 @@ class TipFinder {
     bool prefer_gray(const CrackTip& tip, const CrackTip& by_gray, const DisplacementField& field) const {
         if (tip.status == TipStatus::too_few_points || by_gray.status == TipStatus::outside) return true;
         if (by_gray.status != TipStatus::ok) return false;
-        if (tip.status == TipStatus::ok && by_gray.along >= tip.along) return false;
+        if (tip.status == TipStatus::ok && by_gray.tip_sigma >= tip.tip_sigma) return false;
         // The dark line's end is behind the tip where the crack's opening is too small to be seen: so near the two agree.
-        if (tip.status == TipStatus::ok && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.along, tip.along))
+        if (tip.status == TipStatus::ok && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.tip_sigma, tip.tip_sigma))
             return true;
         // A line whose sides lie still is a shadow.
         const std::optional<double> apart = motion_apart(geometry_, field, by_gray);

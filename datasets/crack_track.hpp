@@ -37,7 +37,7 @@ struct CrackTip {
     double sigma = unknown;      // standard error of the length [px]
     // Of the crack from its mouth to the tip, or through the picture, where it was followed; else it is straight [px].
     std::vector<Vec2> way = {};
-    double along = unknown;  // standard error of the tip along the crack; no file keeps it [px]
+    double tip_sigma = unknown;  // standard error of the tip, along the crack; no file keeps it [px]
 };
 
 /// How the images' clock was set by the load's: load time = offset + rate * image time.

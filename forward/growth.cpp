@@ -89,7 +89,7 @@ double trust_in_intensities(const CrackTip& tip, const MaterialMap& materials, d
         const auto otherness = [&](double distance) {
             const double modulus = materials.at(tip.position + distance * way).plane_modulus();
             if (modulus <= 0.0 || here <= 0.0) return 0.0;  // a void is no other wood
-            return std::clamp((std::abs(std::log2(modulus / here)) - same) / (other - same), 0.0, 1.0);
+            return std::clamp((std::abs(std::log2(modulus / here)) - same) / std::max(other - same, 1e-9), 0.0, 1.0);
         };
         double before = 0.0;
         for (int i = 1; i <= samples && before < 1.0; ++i) {
@@ -113,7 +113,7 @@ double normal_to_opening(const CrackTip& tip, const TipLoad& load, const Materia
     const double by_grid = normal_angle(tip, load.opening);
     const LocalWood wood = materials.at(tip.position);
     if (!std::isfinite(load.K_I) || wood.plane_modulus() <= 0.0) return by_grid;  // a void has no K
-    const double trust = trust_in_intensities(tip, materials, 0.5 * increment, increment, 1.0, 1.0 + 1e-9);
+    const double trust = trust_in_intensities(tip, materials, 0.5 * increment, increment, 1.0, 1.0);
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 opening = field.release() * Vec2(load.K_I, load.K_II);  // by K_I across, by K_II along
     const double by_intensities = normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction);

@@ -491,7 +491,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     };
     found.length = length(Vec2::Zero(), 0);
     if (missed) {
-        found.along = found.sigma = end_error(samples, line, geometry.subset);
+        found.tip_sigma = found.sigma = end_error(samples, line, geometry.subset);
         return found;
     }
     const Vec2 by_tip(0.5 * (length({1, 0}, 0) - length({-1, 0}, 0)), 0.5 * (length({0, 1}, 0) - length({0, -1}, 0)));
@@ -511,7 +511,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     const auto error = [&](const Vec2& by) {
         return std::hypot(std::sqrt(overlap * by.dot(fitted->covariance * by)), by.dot(model_error));
     };
-    found.along = error(line.direction());
+    found.tip_sigma = error(line.direction());
     found.sigma = std::hypot(error(by_tip), turn_error);
     return found;
 }

@@ -24,7 +24,7 @@ struct FieldGeometry {
 /// turn by finer angles and by Levenberg-Marquardt for the tip, at last over a disc around it. Subsets that reach over the crack
 /// or the tip take no part. Where that line misses most of the subsets that were torn, as in strongly layered wood, the crack is
 /// laid through these and ends with the last of them; how far the tip may be from there is told by how the faces close. The
-/// standard error includes what another disc would say.
+/// standard error includes what another disc would say, and that of the length the direction's.
 CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& field);
 
 /// How far the two sides of a crack that was seen otherwise have moved apart, at most, as a field shows it [px]; none where

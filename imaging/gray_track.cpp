@@ -204,7 +204,7 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     points.resize(points.size() > behind ? points.size() - behind : 0);
     points.insert(points.end(), tip->last.begin(), tip->last.end());
     found.way = vectors(points);
-    found.along = found.sigma = std::hypot(tip->sigma, place_error);
+    found.tip_sigma = found.sigma = std::hypot(tip->sigma, place_error);
     return found;
 }
 

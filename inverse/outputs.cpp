@@ -93,6 +93,9 @@ Arrest arrest(const Record& record, int number) {
     const std::vector<double> a = column(record, &Instant::crack_length);
     const Curve crack(u, a);
     const double pace = (a.back() - a.front()) / (u.back() - u.front());
+    if (!(pace > 0)) {
+        return {};
+    }
     const double stretch = least_stretch * (u.back() - u.front());
     const double little = slow * pace * stretch;
     const auto goes_on = [&](double x) { return crack.at(x + stretch) - crack.at(x) >= little; };
@@ -106,7 +109,7 @@ Arrest arrest(const Record& record, int number) {
     bool rests = false;
     double before = u.front();
     for (const double x : places) {
-        if (!(pace > 0) || x <= before || x + stretch > u.back()) {
+        if (x <= before || x + stretch > u.back()) {
             continue;
         }
         const bool moves = goes_on(x);

@@ -9,8 +9,9 @@ namespace crampfit {
 /// arrest that there was not. The record must hold an instant, and finite numbers.
 ///
 /// The initial stiffness is the slope of the line of least squares through the rows in which the crack stands where it began
-/// and the force is below half its peak. An arrest is a stretch of at least a fiftieth of the record's displacement over which
-/// the crack, having grown, grows at less than a tenth of its mean pace over the record.
+/// and the force is below half its peak. An arrest is where the crack, having grown, grows over the next fiftieth of the record's
+/// displacement by less than a tenth of what its mean pace over the record would bring. Its length is that at the last such
+/// place, between rows too; its displacement that at which the crack has grown by that tenth from there.
 double output_of(const Record& record, const StudyOutput& output);
 
 }  // namespace crampfit

@@ -196,7 +196,8 @@ TEST(SystemTrack, BadTimesAndLoad) {
     refused({"--times", file("force.csv", "force [N]\n1\n")}, "0 rows");
     const std::string times = file("times.csv", "time [s]\n1\n");
     const std::string rising = file("load.csv", "time [s],force [N]\n0,1\n2,1\n");
-    refused({"--load", rising}, "without --times the load needs a row for each of the 1 images");
+    refused({"--load", rising}, "without --times it needs a row for each of the 1 images");
+    refused({"--load", file("gap.csv", "time [s],force [N]\n,1\n")}, "times of the images must not fall, and have no gaps");
     refused({"--load", rising, "--offset", "1 s"}, "--times");
     refused({"--times", times, "--offset", "1 s"}, "--load");
     refused({"--times", times, "--load", rising, "--offset", "1"}, "--offset");

@@ -421,36 +421,18 @@ TEST(SystemFit, AllMethodsWeighByTheNoiseThatExplainsTheData) {
 // The crack parts the specimen between two of the last rows: that tells toughness / E to 3 %, and beyond, to either side, the
 // misfit is flat.
 TEST(SystemFit, AToughnessThatOneJumpTellsIsFoundFromFarOff) {
-    const Scene scene = parse_scene(R"(
-[model]
-plane = "strain"
-thickness = "10 mm"
-cell = "0.5 mm"
-[specimen]
-size = ["10 mm", "10 mm"]
-material = "EW"
-[materials]
-EW = { kind = "isotropic", E = "40 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "100 J/m^2" }
-[[edges]]
-side = "top"
-velocity = ["0 m/s", "1 mm/min"]
-[[edges]]
-side = "bottom"
-velocity = ["0 m/s", "0 m/s"]
-[[cracks]]
-points = [["10 mm", "5 mm"], ["7.5 mm", "5 mm"]]
-grows = "end"
-advance = "1 mm"
-direction = "straight"
-[solver]
-strain = "small"
-[measure]
-force = "top"
-displacement = "top"
-[stop]
-displacement = "2 mm"
-)",
-                                    "parted.toml");
+    Scene scene = bar_scene();
+    scene.model.cell = 0.5e-3;
+    scene.specimen.size = {10e-3, 10e-3};
+    scene.model.plane = PlaneCondition::strain;
+    scene.materials["EW"] = {40e6, 0.33, 300, 100};
+    Crack& crack = scene.cracks.emplace_back();
+    crack.points = {{10e-3, 5e-3}, {7.5e-3, 5e-3}};
+    crack.grows = Growth::end;
+    crack.advance = 1e-3;
+    crack.direction = GrowthDirection::straight;
+    scene.solver.strain = StrainMeasure::small;
+    scene.stop.displacement = 2e-3;
     const Record record = simulate(scene);
     const auto peak = std::ranges::max_element(record.series, {}, &Instant::force);
     Study study;
