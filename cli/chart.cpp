@@ -11,9 +11,11 @@ namespace crampfit::cli {
 
 namespace {
 
-constexpr double plot_width = 400, plot_height = 250;  // of the axes [px]
-constexpr double margin_left = 62, margin_right = 14, margin_bottom = 42, legend_line = 16, title_height = 20;  // [px]
+constexpr double plot_width = 400, plot_height = 250;                                                          // of the axes [px]
+constexpr double least_left = 62, margin_right = 14, margin_bottom = 42, legend_line = 16, title_height = 20;  // [px]
 constexpr double character_width = 6.2;      // of the legend, on average [px]
+constexpr double digit_width = 6.8;          // of the ticks [px]
+constexpr double beside_ticks = 29;          // the axis' label and the ticks' lines [px]
 constexpr std::size_t most_vertices = 1200;  // of a line
 
 /// One axis: numbers to pixels.
@@ -124,8 +126,16 @@ class Drawing {
         }
     }
 
+    std::vector<double> y_ticks() const { return y_.log ? log_ticks(y_) : linear_ticks(y_, 5); }
+    std::string y_text(double tick) const { return number_text(tick, y_.log ? 1e-300 : y_.high - y_.low); }
+
     /// The rectangle of the axes, below the title and the legend.
     void place() {
+        for (const double tick : y_ticks()) {
+            const std::string text = y_text(tick);
+            const auto letters = std::ranges::count_if(text, [](char c) { return (c & 0xc0) != 0x80; });  // of UTF-8
+            left_ = std::max(left_, beside_ticks + digit_width * static_cast<double>(letters));
+        }
         double wide = plot_width, high = plot_height;
         if (chart_.equal_scales) {
             const double ratio = (y_.high - y_.low) / (x_.high - x_.low);
@@ -141,21 +151,21 @@ class Drawing {
                 ++lines;
                 line = 0;
             }
-            legend_.push_back({margin_left + line, title_height + legend_line * (lines - 0.3), &series});
+            legend_.push_back({left_ + line, title_height + legend_line * (lines - 0.3), &series});
             line += needed;
         }
         const double top = title_height + legend_line * lines + 8;
-        x_.from = margin_left;
-        x_.to = margin_left + wide;
+        x_.from = left_;
+        x_.to = left_ + wide;
         y_.from = top + high;
         y_.to = top;
-        width_ = margin_left + plot_width + margin_right;
+        width_ = left_ + plot_width + margin_right;
         height_ = top + high + margin_bottom;
     }
 
     std::string heading() const {
-        std::string text = fmt::format("<text x=\"{}\" y=\"14\" font-weight=\"600\" font-size=\"12\">{}</text>\n", margin_left,
-                                       escaped(chart_.title));
+        std::string text =
+            fmt::format("<text x=\"{}\" y=\"14\" font-weight=\"600\" font-size=\"12\">{}</text>\n", left_, escaped(chart_.title));
         for (const LegendEntry& entry : legend_) {
             const ChartSeries& series = *entry.series;
             text += series.kind == ChartSeries::Kind::points
@@ -191,7 +201,6 @@ class Drawing {
 
     void draw_axes() {
         const std::vector<double> x_ticks = linear_ticks(x_, 6);
-        const std::vector<double> y_ticks = y_.log ? log_ticks(y_) : linear_ticks(y_, 5);
         const bool grid = chart_.pictures.empty();
         for (const double tick : x_ticks) {
             if (grid) line(x_.at(tick), y_.from, x_.at(tick), y_.to, "#ececec");
@@ -199,11 +208,11 @@ class Drawing {
             svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", x_.at(tick), y_.from + 16,
                                 number_text(tick, x_.high - x_.low));
         }
-        for (const double tick : y_ticks) {
+        for (const double tick : y_ticks()) {
             if (grid) line(x_.from, y_.at(tick), x_.to, y_.at(tick), "#ececec");
             line(x_.from - 4, y_.at(tick), x_.from, y_.at(tick), "#555");
             svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", x_.from - 7, y_.at(tick) + 4,
-                                number_text(tick, y_.log ? 1e-300 : y_.high - y_.low));
+                                y_text(tick));
         }
         for (const double level : chart_.x_levels)
             if (level >= x_.low && level <= x_.high)
@@ -311,7 +320,7 @@ class Drawing {
     const Chart& chart_;
     Axis x_, y_;
     bool empty_ = false;
-    double width_ = 0, height_ = 0;  // [px]
+    double left_ = least_left, width_ = 0, height_ = 0;  // [px]
     std::vector<LegendEntry> legend_;
     std::string svg_;
 };

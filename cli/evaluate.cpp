@@ -118,15 +118,18 @@ std::string evaluate(const Study& study, const DakotaRequest& request, const Poi
 
 ExitStatus evaluate_and_save(const EvaluateArguments& arguments, const CommonOptions& common) {
     check_output(arguments.results, {arguments.study, arguments.parameters});
-    const Study study = open_study(arguments.study, common);
-    check_output(arguments.results, files_of(study));
     std::string failure;
+    bool is_ours = may_hold_dakota_answer(arguments.results);
     try {
+        const Study study = open_study(arguments.study, common);
+        is_ours = false;
+        check_output(arguments.results, files_of(study));
+        is_ours = true;
         const DakotaRequest request = read_dakota_request(arguments.parameters);
         failure = evaluate(study, request, point_of(request, study, arguments.parameters.string()), common, arguments.parameters,
                            arguments.results);
     } catch (const InputError& error) {  // no answer to an earlier question stays
-        write_dakota_failure(error.what(), arguments.results);
+        if (is_ours) write_dakota_failure(error.what(), arguments.results);
         throw;
     }
     if (failure.empty()) return ExitStatus::done;

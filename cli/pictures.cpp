@@ -79,8 +79,13 @@ Correlator make_correlator(const PictureSeries& series, const CommonOptions& com
     FinePicture reference = read_reference(series);
     const std::vector<std::uint8_t> mask = read_mask(series.mask, reference);
     Correlator correlator(std::move(reference), mask, options, series.reference.string());
-    for (int image = 0; image < static_cast<int>(series.images.size()); ++image)
-        correlator.check(read_image(series, image), series.images[static_cast<std::size_t>(image)].string());
+    for (int image = 0; image < static_cast<int>(series.images.size()); ++image) {
+        const std::string name = series.images[static_cast<std::size_t>(image)].string();
+        const FinePicture picture = read_image(series, image);
+        correlator.check(picture, name);
+        if (has_one_gray(picture))
+            report(common, fmt::format("{}: has gray {} only and counts as lost", name, picture.gray.front()));
+    }
     return correlator;
 }
 

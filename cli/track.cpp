@@ -25,12 +25,12 @@ struct TrackArguments {
     std::string from = "auto";  // auto, fields or gray
 };
 
-// Of a subset: a tip whose place displacements tell no better is looked for as a dark line, too.
-constexpr double well_known = 0.2;
+constexpr double well_known = 1;      // standard error of a tip, which a dark line does not tell any better [px]
+constexpr double hardly_known = 0.2;  // of a subset: a tip by displacements that an open line's end overrules
 constexpr double agree = 3;           // standard errors between two places of one tip
 constexpr double least_apart = 0.25;  // of the sides of a dark line that is a crack, half of what it needs to be seen [px]
 
-/// The tip by the displacement field, by the picture's gray, or by the gray where the field does not show it well.
+/// The tip by the displacement field, by the picture's gray, or by that of the two which knows it better.
 class TipFinder {
   public:
     TipFinder(const PictureSeries& pictures, const std::string& from, const CommonOptions& common)
@@ -44,9 +44,8 @@ class TipFinder {
         if (!by_fields_) return counted(gray_->tip(image));
         const DisplacementField field = correlator_.field(image);
         const CrackTip tip = find_crack_tip(geometry_, field);
-        if (!gray_ || (tip.status == TipStatus::ok && tip.tip_sigma < well_known * geometry_.subset)) return tip;
-        const CrackTip by_gray = gray_->tip(image);
-        return prefer_gray(tip, by_gray, field) ? counted(by_gray) : tip;
+        if (!gray_ || (tip.status == TipStatus::ok && tip.tip_sigma < well_known)) return tip;
+        return better(tip, gray_->tip(image), field);
     }
 
     int from_gray() const { return from_gray_; }
@@ -58,17 +57,25 @@ class TipFinder {
         return by_gray;
     }
 
-    /// Displacements do not show the tip well.
-    bool prefer_gray(const CrackTip& tip, const CrackTip& by_gray, const DisplacementField& field) const {
-        if (tip.status == TipStatus::too_few_points || by_gray.status == TipStatus::outside) return true;
-        if (by_gray.status != TipStatus::ok) return false;
-        if (tip.status == TipStatus::ok && by_gray.tip_sigma >= tip.tip_sigma) return false;
+    CrackTip better(const CrackTip& tip, const CrackTip& by_gray, const DisplacementField& field) {
+        const bool known = tip.status == TipStatus::ok;
+        // A line through the whole picture is no crack's where displacements show a tip that can be nowhere near its end.
+        const bool parted = by_gray.status == TipStatus::outside &&
+                            (!known || by_gray.way.empty() || (by_gray.way.back() - tip.tip).norm() < agree * tip.tip_sigma);
+        if (tip.status == TipStatus::too_few_points || parted) return counted(by_gray);
+        if (by_gray.status != TipStatus::ok || (known && by_gray.tip_sigma >= tip.tip_sigma)) return tip;
         // The dark line's end is behind the tip where the crack's opening is too small to be seen: so near the two agree.
-        if (tip.status == TipStatus::ok && (by_gray.tip - tip.tip).norm() < agree * std::hypot(by_gray.tip_sigma, tip.tip_sigma))
-            return true;
+        const double distance = (by_gray.tip - tip.tip).norm();
+        if (known && distance < agree * std::hypot(by_gray.tip_sigma, tip.tip_sigma)) return counted(by_gray);
         // A line whose sides lie still is a shadow.
         const std::optional<double> apart = motion_apart(geometry_, field, by_gray);
-        return apart ? *apart > least_apart : tip.status != TipStatus::ok;
+        if (apart ? *apart <= least_apart : known) return tip;
+        if (!known || tip.tip_sigma > hardly_known * geometry_.subset) return counted(by_gray);
+        // Two that know it well and contradict each other: neither may say so much.
+        CrackTip doubtful = tip;
+        doubtful.tip_sigma = distance / agree;
+        doubtful.sigma *= doubtful.tip_sigma / tip.tip_sigma;
+        return doubtful;
     }
 
     Correlator correlator_;
@@ -134,9 +141,9 @@ Verb track_verb(CLI::App& command, const CommonOptions& common) {
     CLI::App* verb = command.add_subcommand("track", "Crack tip and crack length from pictures");
     add_picture_series(*verb, arguments->pictures, "TRACK.h5");
     add_picture_times(*verb, arguments->times);
-    verb->add_option("--from", arguments->from,
-                     "fields: displacements by correlation; gray: the dark line that opens; auto: the line where displacements "
-                     "do not show the tip well")
+    verb->add_option(
+            "--from", arguments->from,
+            "fields: displacements by correlation; gray: the dark line that opens; auto: the one that knows the tip better")
         ->check(CLI::IsMember({"auto", "fields", "gray"}))
         ->capture_default_str();
     return {verb, [arguments, &common] { return track_and_save(*arguments, common); }};

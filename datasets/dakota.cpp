@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <fstream>
 #include <numeric>
 #include <sstream>
 
@@ -195,6 +196,17 @@ void write_dakota_results(const DakotaRequest& request, const std::vector<double
         }
     }
     write_whole_file(file, text);
+}
+
+bool may_hold_dakota_answer(const std::filesystem::path& file) {
+    std::ifstream in(file);
+    std::string word;
+    if (!(in >> word)) {
+        return true;
+    }
+    double number = 0;
+    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    return word == "fail:" || word == "[" || (error == std::errc() && rest == word.data() + word.size());
 }
 
 void write_dakota_failure(const std::string& reason, const std::filesystem::path& file) {

@@ -32,6 +32,9 @@ std::vector<std::size_t> outputs_asked_for(const DakotaRequest& request, const s
 void write_dakota_results(const DakotaRequest& request, const std::vector<double>& values,
                           const std::vector<std::vector<double>>& gradients, const std::filesystem::path& file);
 
+/// Whether a file may be written as an answer before it is known what else is read: it is not there, or looks like one.
+bool may_hold_dakota_answer(const std::filesystem::path& file);
+
 /// Tells Dakota that the evaluation failed, for its failure capturing.
 void write_dakota_failure(const std::string& reason, const std::filesystem::path& file);
 

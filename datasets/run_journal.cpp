@@ -120,6 +120,9 @@ RunJournal::RunJournal(const std::filesystem::path& file, std::uint64_t study, b
         if (!begins_as_ours(bytes)) {
             throw InputError(file.string(), "", "", "does not hold runs: another name is needed for -o");
         }
+        if (!resume && bytes.size() > entry(head(study)).size()) {  // a night's runs are not lost to a word left out
+            write_whole_file(file.string() + "~", bytes);
+        }
         const std::size_t whole = resume ? read(bytes, study) : 0;
         if (::ftruncate(descriptor_, static_cast<off_t>(whole)) != 0) {
             throw InputError(file.string(), "", "", fmt::format("cannot be written: {}", std::strerror(errno)));

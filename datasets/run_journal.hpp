@@ -24,7 +24,8 @@ struct StoredRun {
 class RunJournal {
   public:
     /// Opens `file` for appending. `study` says what the runs depend on besides their parameters. With `resume` the runs that are
-    /// there are read; without, or where there is no such file, it begins empty. Throws InputError when the file cannot be
+    /// there are read; without, or where there is no such file, it begins empty, and what was there is kept in a file with ~ at
+    /// its end. Throws InputError when the file cannot be
     /// written, is in use, or holds runs of another study.
     RunJournal(const std::filesystem::path& file, std::uint64_t study, bool resume);
     ~RunJournal();

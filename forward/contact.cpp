@@ -74,8 +74,9 @@ double signed_depth(const Shape& shape, const Vec2& x) {
 }  // namespace
 
 bool is_small_circle(const Shape& shape, const Layout& layout) {
+    constexpr double hair = 1e-6;  // of the most: last digits of the specimen's size decide nothing
     const auto* circle = std::get_if<Circle>(&shape);
-    return circle && circle->radius <= most_radius_in_cells * layout.cell.maxCoeff();
+    return circle && circle->radius <= (1.0 + hair) * most_radius_in_cells * layout.cell.maxCoeff();
 }
 
 // How deep x lies in the shape; nothing outside it.
@@ -221,7 +222,8 @@ bool SlidingBody::find_joint(int facet) {
 
 // The mean is over as much both ways as the outline goes on, so that what is linear along it stays.
 void SlidingBody::find_holds(int facet) {
-    const int most = static_cast<int>(0.5 * width_ / this->facet(facet).length);
+    constexpr double hair = 1e-6;  // of the width, which is a whole number of facets but for last digits of the specimen's size
+    const int most = static_cast<int>((1.0 + hair) * 0.5 * width_ / this->facet(facet).length);
     int low = facet, high = facet, each = 0;
     for (; each < most; ++each) {
         const int before = next(low, false), after = next(high, true);

@@ -149,7 +149,7 @@ void Equilibrium::see_what_is_kept() {
         for_groups(body_.points, c, [&](const PointGroup& group) {
             const SeenStrains seen(body_, *history_, group, displacement_, plan_.rotates);
             for (int i = 0; i < group.count; ++i) {
-                const int p = group.first + i;
+                const int p = group.point[i];
                 const Eigen::Vector3d& strain = seen.strain[i];
                 const Tensor stress = history_->stress(p, strain);
                 const double work = stress[0] * strain[0] + stress[1] * strain[1] + stress[3] * strain[2];
@@ -264,11 +264,10 @@ void Equilibrium::add_extra(int cell, std::span<const int> fields, const Eigen::
     couple_fields(fields, stiffness);
 }
 
-// Points of a cell that follow each other on the same fields go together.
+// Points of a cell that are on the same fields go together.
 template <class Visit>
 void Equilibrium::for_groups_of(int c, const Visit& visit) const {
-    for_groups(body_.points, c,
-               [&](const PointGroup& group) { visit(std::as_const(body_.points).node[group.first], group.first, group.count); });
+    for_groups(body_.points, c, [&](const PointGroup& group) { visit(std::as_const(body_.points).node[group.point[0]], group); });
 }
 
 // The same of the points.
@@ -280,9 +279,9 @@ void Equilibrium::couple_points(bool geometric) {
                free_of_dof_[2 * f + 1] >= 0;
     };
     for (int c = 0; c < body_.layout.cells(); ++c)
-        for_groups_of(c, [&](std::span<const int> fields, int first, int count) {
+        for_groups_of(c, [&](std::span<const int> fields, const PointGroup& group) {
             if (std::any_of(fields.begin(), fields.end(), goes))
-                couple_fields(fields, internal_force_.tangent(first, count, displacement_, geometric));
+                couple_fields(fields, internal_force_.tangent(group, displacement_, geometric));
         });
 }
 
@@ -366,7 +365,8 @@ void Equilibrium::mark_changes(bool geometric, double slack) {
     if (plan_.linear) return;
     factored_at_.resize(body_.points.count(), Mat2::Constant(INFINITY));
     for (int c = 0; c < body_.layout.cells(); ++c)
-        for_groups_of(c, [&](std::span<const int>, int first, int) {
+        for_groups_of(c, [&](std::span<const int>, const PointGroup& group) {
+            const int first = group.point[0];
             const Mat2 change = gradient_at(body_, first, displacement_) - factored_at_[first];
             if (!(change.cwiseAbs().maxCoeff() <= slack)) factor_.mark(c);
         });
@@ -394,8 +394,9 @@ bool Equilibrium::factor_tangent(bool geometric, double slack) {
     for (const int c : touched_cells_) factor_.mark(c);
     ++factorisations_;
     const auto assemble = [&](int cell, std::vector<GridFactor::Element>& elements) {
-        for_groups_of(cell, [&](std::span<const int> fields, int first_point, int count) {
-            elements.push_back(element(fields, internal_force_.tangent(first_point, count, displacement_, geometric)));
+        for_groups_of(cell, [&](std::span<const int> fields, const PointGroup& group) {
+            const int first_point = group.point[0];
+            elements.push_back(element(fields, internal_force_.tangent(group, displacement_, geometric)));
             if (!plan_.linear) factored_at_[first_point] = gradient_at(body_, first_point, displacement_);
             if (loose_) {
                 const double spring =

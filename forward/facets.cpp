@@ -107,6 +107,9 @@ void Discretisation::find_facets(const Scene& scene) {
     const Vec2 size = layout.size();
     const Box rectangle{Vec2::Zero(), size};
     const double beside = just_beside * layout.cell.minCoeff();
+    // A facet may be longer by a hair: where last digits of the specimen's size make cells a little narrower one way, those along
+    // their other side are still as many.
+    constexpr double hair = 1e-6;  // of its length
     const double step = facet_in_points * layout.point_size().minCoeff();
     const auto cut_by_first = [&](std::size_t count, const Vec2& x) {
         const auto end = cutouts.begin() + static_cast<std::ptrdiff_t>(count);
@@ -122,7 +125,7 @@ void Discretisation::find_facets(const Scene& scene) {
             return rectangle.contains(in) && has_wood(scene.specimen, in) && !cut_by_first(earlier, out);
         };
         for (const auto& [begin, end] : stretches(curve.length, step, is_surface)) {
-            const int count = std::max(1, static_cast<int>(std::ceil((end - begin) / step - just_beside)));
+            const int count = std::max(1, static_cast<int>(std::ceil((1.0 - hair) * (end - begin) / step)));
             for (int k = 0; k < count; ++k) {
                 const double s = begin + (k + 0.5) / count * (end - begin);
                 const int p = point_beside(curve.position(s) - beside * curve.normal(s));

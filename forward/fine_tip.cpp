@@ -24,7 +24,7 @@ constexpr std::array<double, 2> half_widths_close_by{6.0, 4.0};
 constexpr std::array<double, 1> half_widths_elsewhere{4.0};
 constexpr double close_by = 0.5 + 1e-6;  // half a cell too
 
-// Boxes begin and end at multiples of so many of these cells, so that those of neighbouring places are the same more often.
+// Boxes begin and end at every so many of these cells, so that those of neighbouring places are the same more often.
 constexpr std::array<double, 3> pitches{2.0, 2.0, 4.0};
 
 // As many cut-outs are kept as two sets of boxes take, for the ends of an advance, and as many again for another tip.
@@ -100,14 +100,15 @@ Nearest nearest_boundary(const Discretisation& body, const Vec2& from, const Vec
     return nearest;
 }
 
-// A box around a way, along the nearest lines of the grid, as far as that goes. Of two as near the one outside, so that a
-// mirrored scene has the same.
-Box box_around(const Box& way, double half_width, double pitch, const Vec2& cell, const Box& within) {
+// A box around a way, along the nearest lines of the grid, as far as that goes. Of two as near the one outside, and lines are
+// counted from the side of the specimen that they are on, so that a mirrored scene has the same.
+Box box_around(const Box& way, double half_width, double pitch, const Vec2& cell, const Vec2& size, const Box& within) {
     constexpr double hair = 1e-6;
-    const Eigen::Array2d low = (way.low.cwiseQuotient(cell).array() - half_width) / pitch - 0.5 - hair;
-    const Eigen::Array2d high = (way.high.cwiseQuotient(cell).array() + half_width) / pitch + 0.5 + hair;
-    return {(pitch * cell.array() * low.ceil()).matrix().cwiseMax(within.low),
-            (pitch * cell.array() * high.floor()).matrix().cwiseMin(within.high)};
+    const auto lines = [&](const Eigen::Array2d& from) { return pitch * ((from - half_width) / pitch - 0.5 - hair).ceil(); };
+    const Eigen::Array2d cells = size.cwiseQuotient(cell).array().round();
+    const Eigen::Array2d low = lines(way.low.cwiseQuotient(cell).array());
+    const Eigen::Array2d high = cells - lines(cells - way.high.cwiseQuotient(cell).array());
+    return {(cell.array() * low).matrix().cwiseMax(within.low), (cell.array() * high).matrix().cwiseMin(within.high)};
 }
 
 // Whether no body acts on a box inside, and no crack but this one parts a node of it, or is to.
@@ -228,11 +229,12 @@ std::optional<TipBoxes> FineTip::about(const CrackFields& cracks, const TipWay& 
     const Box way{from.cwiseMin(to), from.cwiseMax(to)};
     Vec2 cell = body_.layout.cell;
     for (std::size_t k = is_close ? 0 : 1; k < outermost_half_widths.size(); ++k) {
-        const Box outermost = box_around(way, outermost_half_widths[k], pitches[0], cell, {Vec2::Zero(), size});
+        const Box outermost = box_around(way, outermost_half_widths[k], pitches[0], cell, size, {Vec2::Zero(), size});
         if (!stands_alone(scene_, body_.layout, cracks, crack, outermost, others)) continue;
         TipBoxes found{{outermost}, std::min(1.0, (far - nearest.way) / (far - near))};
         for (const double half_width : inner)
-            found.boxes.push_back(box_around(way, half_width, pitches[found.boxes.size()], cell *= 0.5, found.boxes.back()));
+            found.boxes.push_back(
+                box_around(way, half_width, pitches[found.boxes.size()], cell *= 0.5, size, found.boxes.back()));
         return found;
     }
     return std::nullopt;
@@ -346,7 +348,7 @@ FineTip::Ahead FineTip::ahead(const CrackFields& cracks, int crack, bool at_end,
     if (!boxes) return {};
     const Vec2& cell = body_.layout.cell;
     const Box within{Vec2::Zero(), body_.layout.size()}, &outermost = boxes->boxes[0];
-    Box around = box_around(box, 0.0, pitches[0], cell, within);
+    Box around = box_around(box, 0.0, pitches[0], cell, within.high, within);
     around = {around.low.cwiseMin((outermost.low - cell).cwiseMax(within.low)),
               around.high.cwiseMax((outermost.high + cell).cwiseMin(within.high))};
     if (!stands_alone(scene_, body_.layout, cracks, crack, around, {})) return {};

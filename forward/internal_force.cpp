@@ -280,16 +280,17 @@ double InternalForce::visit_cells(std::span<const int> cells, const Wood& wood, 
 }
 
 template <int Count>
-Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const {
+Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(std::span<const int> group, const std::vector<Vec2>& displacement,
+                                                      bool geometric) const {
     using Lane = Eigen::Array<double, Count, 1>;
     const Points& points = body_.points;
-    const auto node = points.node[first];
+    const auto node = points.node[group[0]];
     std::array<Lane, 4> slope_x, slope_y;
     std::array<Lane, 4> gradient;
     gradient.fill(Lane::Zero());
     for (int k = 0; k < 4; ++k) {
         for (int i = 0; i < Count; ++i) {
-            const CellWeights& w = body_.weights[points.slot[first + i]];
+            const CellWeights& w = body_.weights[points.slot[group[i]]];
             slope_x[k][i] = w.slope_x[k];
             slope_y[k][i] = w.slope_y[k];
         }
@@ -300,9 +301,10 @@ Eigen::Matrix<double, 8, 8> InternalForce::tangent_of(int first, const std::vect
         gradient[2] += u.y() * slope_x[k];
         gradient[3] += u.y() * slope_y[k];
     }
-    const Lane volume = Eigen::Map<const Lane>(&points.volume[first]);
+    Lane volume;
+    for (int i = 0; i < Count; ++i) volume[i] = points.volume[group[i]];
     std::array<Lane, 6> C;
-    for (int k = 0; k < 6; ++k) C[k] = volume * points.stiffness[points.cell[first]][k];
+    for (int k = 0; k < 6; ++k) C[k] = volume * points.stiffness[points.cell[group[0]]][k];
     const std::array<std::array<Lane, 4>, 4> A = elastic_tangent(gradient, C, rotates_, geometric);
     Eigen::Matrix<double, 8, 8> sum;
     for (int b = 0; b < 4; ++b) {
@@ -332,7 +334,7 @@ Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup&
     std::array<Eigen::Vector3d, most_in_group> stresses;
     std::array<Eigen::Matrix3d, most_in_group> tangents;
     for (int i = 0; i < group.count; ++i) {
-        const CellWeights& w = body_.weights[body_.points.slot[group.first + i]];
+        const CellWeights& w = body_.weights[body_.points.slot[group.point[i]]];
         gradients[i].setZero();
         for (int k = 0; k < 4; ++k)
             for (int axis = 0; axis < 2; ++axis) gradients[i].block<2, 1>(2 * axis, 2 * k + axis) << w.slope_x[k], w.slope_y[k];
@@ -345,7 +347,7 @@ Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup&
         } else {
             slopes[i] << gradients[i].row(0), gradients[i].row(3), gradients[i].row(1) + gradients[i].row(2);
         }
-        const PlaneResponse response = history_->respond(group.first + i, seen.strain[i]);
+        const PlaneResponse response = history_->respond(group.point[i], seen.strain[i]);
         stresses[i] = response.stress;
         tangents[i] = response.tangent;
     }
@@ -353,7 +355,7 @@ Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup&
     seen.share(stresses);
     Eigen::Matrix<double, 8, 8> sum = Eigen::Matrix<double, 8, 8>::Zero();
     for (int i = 0; i < group.count; ++i) {
-        const double volume = body_.points.volume[group.first + i];
+        const double volume = body_.points.volume[group.point[i]];
         sum += volume * slopes[i].transpose() * tangents[i] * slopes[i];
         if (!rotates_ || !geometric) continue;
         const Mat2& G = seen.gradient[i];
@@ -367,17 +369,17 @@ Eigen::Matrix<double, 8, 8> InternalForce::remembering_tangent(const PointGroup&
     return sum;
 }
 
-Eigen::Matrix<double, 8, 8> InternalForce::tangent(int first, int count, const std::vector<Vec2>& displacement,
+Eigen::Matrix<double, 8, 8> InternalForce::tangent(const PointGroup& group, const std::vector<Vec2>& displacement,
                                                    bool geometric) const {
-    const int cell = body_.points.cell[first];
-    if (history_ && history_->is_in(cell)) return remembering_tangent({first, count}, displacement, geometric);
+    const int first = group.point[0], cell = body_.points.cell[first];
+    if (history_ && history_->is_in(cell)) return remembering_tangent(group, displacement, geometric);
     if (body_.layout.degree == 1 && body_.cell_is_whole(cell)) return whole_tangent(cell, displacement, geometric);
     const Shortened* rest = shortened(cell);
     Eigen::Matrix<double, 8, 8> sum =
         rest ? rest_of(*rest, body_.points.stiffness_of(first), body_.points.moduli[cell], displacement).tangent(geometric)
-             : elastic_tangent_of(first, count, displacement, geometric);
+             : elastic_tangent_of(group.points(), displacement, geometric);
     for (const UnevenCells::Piece& piece : uneven_.pieces(cell, cell + 1))
-        if (!piece.is_sliver && piece.point >= first && piece.point < first + count)
+        if (!piece.is_sliver && body_.points.node.same(piece.point, first))
             sum += uneven_.tangent(piece, displacement, geometric);
     return sum;
 }
@@ -458,22 +460,22 @@ Eigen::Matrix<double, 8, 8> InternalForce::whole_tangent(int cell, const std::ve
         .tangent(geometric);
 }
 
-Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
+Eigen::Matrix<double, 8, 8> InternalForce::elastic_tangent_of(std::span<const int> group, const std::vector<Vec2>& displacement,
                                                               bool geometric) const {
-    switch (count) {
+    switch (group.size()) {
     case 1:
-        return tangent_of<1>(first, displacement, geometric);
+        return tangent_of<1>(group, displacement, geometric);
     case 4:
-        return tangent_of<4>(first, displacement, geometric);
+        return tangent_of<4>(group, displacement, geometric);
     case 9:
-        return tangent_of<9>(first, displacement, geometric);
+        return tangent_of<9>(group, displacement, geometric);
     case 16:
-        return tangent_of<16>(first, displacement, geometric);
+        return tangent_of<16>(group, displacement, geometric);
     case 25:
-        return tangent_of<25>(first, displacement, geometric);
+        return tangent_of<25>(group, displacement, geometric);
     default:
-        return elastic_tangent_of(first, 1, displacement, geometric) +
-               elastic_tangent_of(first + 1, count - 1, displacement, geometric);
+        return elastic_tangent_of(group.first(1), displacement, geometric) +
+               elastic_tangent_of(group.subspan(1), displacement, geometric);
     }
 }
 
@@ -491,7 +493,7 @@ double InternalForce::visit_remembering(std::span<const PointGroup> groups, cons
         const SeenStrains seen(body_, *history_, group, displacement, rotates_);
         std::array<Eigen::Vector3d, most_in_group> stresses;
         for (int i = 0; i < group.count; ++i) {
-            const int p = group.first + i;
+            const int p = group.point[i];
             if (wanted != Wanted::energy) stresses[i] = history_->respond(p, seen.strain[i]).stress;
             if (wanted != Wanted::forces) energy += body_.points.volume[p] * history_->stored(p, seen.strain[i]);
         }
@@ -499,7 +501,7 @@ double InternalForce::visit_remembering(std::span<const PointGroup> groups, cons
         seen.share(stresses);
         for (int i = 0; i < group.count; ++i) {
             const auto stress = [&](const Eigen::Vector3d&) { return stresses[i]; };
-            add_stress(group.first + i, state_with(seen.gradient[i], rotates_, stress).stress, *force);
+            add_stress(group.point[i], state_with(seen.gradient[i], rotates_, stress).stress, *force);
         }
     }
     return energy;

@@ -51,9 +51,9 @@ class InternalForce {
     /// [per the number's unit]. Where no wood remembers.
     double add_slope(const MaterialSlope& number, const std::vector<Vec2>& displacement, std::vector<Vec2>& force) const;
 
-    /// Second derivative of the energy of points that follow each other on the same fields, by these fields' displacements [N/m];
+    /// Second derivative of the energy of all points of a cell that are on the same fields, by these fields' displacements [N/m];
     /// `geometric` as in `elastic_tangent`.
-    Eigen::Matrix<double, 8, 8> tangent(int first, int count, const std::vector<Vec2>& displacement, bool geometric) const;
+    Eigen::Matrix<double, 8, 8> tangent(const PointGroup& group, const std::vector<Vec2>& displacement, bool geometric) const;
 
     /// The same of a sliver, and what it changes of its point's.
     std::array<Eigen::Matrix<double, 8, 8>, 2> tangents(const Sliver& sliver, const std::vector<Vec2>& displacement,
@@ -115,7 +115,7 @@ class InternalForce {
     double crosswise_stiffness(const Alone& alone, const Eigen::Matrix3d& stiffness) const;
     void add_alone(int point);
     void add_alone(int cell, std::span<const int> fields, double volume, const Vec2& moments);
-    Eigen::Matrix<double, 8, 8> elastic_tangent_of(int first, int count, const std::vector<Vec2>& displacement,
+    Eigen::Matrix<double, 8, 8> elastic_tangent_of(std::span<const int> group, const std::vector<Vec2>& displacement,
                                                    bool geometric) const;
     std::span<const PointGroup> remembering_of(int strip) const {
         const auto [from, to] = std::pair(first_of_strip_[strip].remembering, first_of_strip_[strip + 1].remembering);
@@ -127,7 +127,8 @@ class InternalForce {
     Eigen::Matrix<double, 8, 8> remembering_tangent(const PointGroup& group, const std::vector<Vec2>& displacement,
                                                     bool geometric) const;
     template <int Count>
-    Eigen::Matrix<double, 8, 8> tangent_of(int first, const std::vector<Vec2>& displacement, bool geometric) const;
+    Eigen::Matrix<double, 8, 8> tangent_of(std::span<const int> group, const std::vector<Vec2>& displacement,
+                                           bool geometric) const;
 
     const Discretisation& body_;
     bool rotates_;

@@ -69,6 +69,7 @@ struct LocalYield::Solved {
 
 // Gives the facets that are held, in order.
 std::vector<int> LocalYield::place_stations(const Box& where, const std::vector<Facet>& facets, double pitch) {
+    constexpr double hair = 1e-6;  // of a length: half a pitch over is half but for last digits of the specimen's size
     std::vector<int> held;
     for (int i = 0; i < static_cast<int>(facets.size()); ++i)
         if (where.contains(facets[i].position)) held.push_back(i);
@@ -82,7 +83,7 @@ std::vector<int> LocalYield::place_stations(const Box& where, const std::vector<
             return held[k] == held[k - 1] + 1 && (b.position - a.position).norm() < a.length + b.length;
         };
         for (to = from + 1; to < held.size() && goes_on(to); ++to) length += facets[held[to]].length;
-        const int parts = std::max(1, static_cast<int>(std::lround(length / pitch)));
+        const int parts = std::max(1, static_cast<int>(std::lround((1.0 + hair) * length / pitch)));
         double way = 0.0;
         for (std::size_t k = from; k < to; ++k) {
             const Facet& f = facets[held[k]];
@@ -117,12 +118,13 @@ std::shared_ptr<LocalYield> LocalYield::about(const Box& where, const SlidingBod
     std::shared_ptr<LocalYield> made(new LocalYield);
     const std::vector<int> held = made->place_stations(where, facets, layout.cell.minCoeff() / finer);
     if (held.empty()) return nullptr;
-    // The box, along the grid's lines.
+    // The box, along the grid's lines. Facets lie on these but for rounding.
+    constexpr double hair = 1e-6;  // [cells]
     Box around{facets[held.front()].position, facets[held.front()].position};
     for (const int i : held) around = {around.low.cwiseMin(facets[i].position), around.high.cwiseMax(facets[i].position)};
     const Vec2 cells(layout.cells_x, layout.cells_y);
-    const Vec2 low = (around.low.cwiseQuotient(layout.cell).array() - margin).floor().max(0.0);
-    const Vec2 high = (around.high.cwiseQuotient(layout.cell).array() + margin).ceil().min(cells.array());
+    const Vec2 low = (around.low.cwiseQuotient(layout.cell).array() - margin + hair).floor().max(0.0);
+    const Vec2 high = (around.high.cwiseQuotient(layout.cell).array() + margin - hair).ceil().min(cells.array());
     const Box box{low.cwiseProduct(layout.cell), high.cwiseProduct(layout.cell)};
     made->coarse_ = std::make_shared<Solved>(whole, plan, wood, box, layout.cell);
     made->fine_ = std::make_shared<Solved>(whole, plan, wood, box, layout.cell / finer);

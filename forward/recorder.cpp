@@ -13,23 +13,24 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
     Frame frame;
     const Points& points = body.points;
     const bool plane_strain = scene.model.plane == PlaneCondition::strain;
-    const auto add = [&](int p, const Mat2& stress, double zz) {
-        frame.moved.push_back(value_at(body, p, displacement).cast<float>());
-        frame.stress.push_back(
-            Eigen::Vector4d(stress(0, 0), stress(1, 1), 0.5 * (stress(0, 1) + stress(1, 0)), zz).cast<float>());
+    frame.moved.resize(points.count());
+    frame.stress.resize(points.count());
+    const auto set = [&](int p, const Mat2& stress, double zz) {
+        frame.moved[p] = value_at(body, p, displacement).cast<float>();
+        frame.stress[p] = Eigen::Vector4d(stress(0, 0), stress(1, 1), 0.5 * (stress(0, 1) + stress(1, 0)), zz).cast<float>();
     };
     for (int c = 0; c < body.layout.cells(); ++c) {
         for_groups(points, c, [&](const PointGroup& group) {
             if (history && history->is_in(c)) {
                 const SeenStrains seen(body, *history, group, displacement, plan.rotates);
                 for (int i = 0; i < group.count; ++i) {
-                    const Tensor s = history->stress(group.first + i, seen.strain[i]);
+                    const Tensor s = history->stress(group.point[i], seen.strain[i]);
                     const auto stress = [&](const Eigen::Vector3d&) { return Eigen::Vector3d(s[0], s[1], s[3]); };
-                    add(group.first + i, state_with(seen.gradient[i], plan.rotates, stress).stress, s[2]);
+                    set(group.point[i], state_with(seen.gradient[i], plan.rotates, stress).stress, s[2]);
                 }
                 return;
             }
-            for (int p = group.first; p < group.first + group.count; ++p) {
+            for (const int p : group.points()) {
                 const Mat2 stress =
                     elastic_state(seen_gradient_at(body, p, displacement, plan.rotates), points.stiffness_of(p), plan.rotates)
                         .stress;
@@ -38,7 +39,7 @@ Frame make_frame(const Scene& scene, const Plan& plan, const Discretisation& bod
                 if (plane_strain)
                     zz = points.out_of_plane.empty() ? points.poisson_ratio[p] * (xx + yy)
                                                      : points.out_of_plane[p].dot(Eigen::Vector3d(xx, yy, xy));
-                add(p, stress, zz);
+                set(p, stress, zz);
             }
         });
     }

@@ -3,24 +3,34 @@
 #include "forward/deformation.hpp"
 #include "forward/history.hpp"
 
+#include <array>
+#include <span>
+
 namespace crampfit {
 
-/// Points of a cell that follow each other on the same fields.
-struct PointGroup {
-    int first;
-    int count;
-};
 constexpr int most_in_group = 25;
+
+/// All points of a cell that are on the same fields, in order. Of a cell that a crack cuts they need not follow each other: which
+/// do is another matter in a mirrored scene.
+struct PointGroup {
+    std::array<int, most_in_group> point;
+    int count = 0;
+
+    std::span<const int> points() const { return {point.data(), static_cast<std::size_t>(count)}; }
+};
 
 /// Calls visit(group) for those of a cell.
 template <class Visit>
 void for_groups(const Points& points, int cell, const Visit& visit) {
-    int p = points.first_of_cell[cell];
-    const int last = points.first_of_cell[cell + 1];
-    while (p < last) {
-        const int first = p;
-        while (p < last && points.node.same(p, first)) ++p;
-        visit(PointGroup{first, p - first});
+    const int first = points.first_of_cell[cell], last = points.first_of_cell[cell + 1];
+    for (int p = first; p < last; ++p) {
+        int like = first;
+        while (!points.node.same(p, like)) ++like;
+        if (like < p) continue;
+        PointGroup group;
+        for (int q = p; q < last; ++q)
+            if (points.node.same(p, q)) group.point[group.count++] = q;
+        visit(group);
     }
 }
 
@@ -38,10 +48,10 @@ class SeenStrains {
   public:
     SeenStrains(const Discretisation& body, const History& history, const PointGroup& group,
                 const std::vector<Vec2>& displacement, bool rotates)
-        : volume_(&body.points.volume[group.first]), count_(group.count),
-          shares_(group.count > 1 && history.flows_in_plane(body.points.cell[group.first])) {
+        : count_(group.count), shares_(group.count > 1 && history.flows_in_plane(body.points.cell[group.point[0]])) {
         for (int i = 0; i < count_; ++i) {
-            gradient[i] = gradient_at(body, group.first + i, displacement);
+            volume_[i] = body.points.volume[group.point[i]];
+            gradient[i] = gradient_at(body, group.point[i], displacement);
             strain[i] = strain_of(gradient[i], rotates);
         }
         share(strain);
@@ -70,7 +80,7 @@ class SeenStrains {
     std::array<Eigen::Vector3d, most_in_group> strain;
 
   private:
-    const double* volume_;
+    std::array<double, most_in_group> volume_;  // [m^3]
     int count_;
     bool shares_;
 };

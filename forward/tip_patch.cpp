@@ -162,10 +162,10 @@ TipPatch::Wood TipPatch::cut_out(const Discretisation& body, const InternalForce
     const std::vector<Vec2> at_rest(fields, Vec2::Zero());
     for (const int c : cells) {
         for_groups(body.points, c, [&](const PointGroup& group) {
-            const auto of = body.points.node[group.first];
-            if (body.layout.degree == 1) add(of, internal_force.tangent(group.first, group.count, at_rest, false));
+            const auto of = body.points.node[group.point[0]];
+            if (body.layout.degree == 1) add(of, internal_force.tangent(group, at_rest, false));
             else
-                for (int p = group.first; p < group.first + group.count; ++p) add(of, stiffness_of(body, p));
+                for (const int p : group.points()) add(of, stiffness_of(body, p));
         });
         for (const InternalForce::Alone& alone :
              std::ranges::equal_range(internal_force.alone(), c, {}, &InternalForce::Alone::cell)) {

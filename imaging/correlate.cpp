@@ -65,20 +65,24 @@ std::vector<PointStatus> usable_points(const FinePicture& picture, const std::ve
     return usable;
 }
 
-void require_contrast(const FinePicture& picture, const std::string& name) {
-    const auto [least, most] = std::ranges::minmax_element(picture.gray);
-    if (*least == *most)
-        throw InputError("command line", "picture", name, fmt::format("has gray {} only: there is nothing to follow", *least));
-}
-
 /// A reference that can be followed.
 FinePicture checked(FinePicture picture, const CorrelateOptions& options, const std::string& name) {
     if (const int least = options.subset + 2 * border; picture.columns < least || picture.rows < least)
         throw InputError("command line", "reference", name,
                          fmt::format("is {} x {} pixels; a subset of {} needs at least {} x {}", picture.columns, picture.rows,
                                      options.subset, least, least));
-    require_contrast(picture, name);
+    if (has_one_gray(picture))
+        throw InputError("command line", "reference", name,
+                         fmt::format("has gray {} only: there is nothing to follow", picture.gray.front()));
     return picture;
+}
+
+/// Of an image that shows nothing, as a camera's dropped frame.
+std::vector<SubsetMatch> lost_matches(const std::vector<PointStatus>& at_start) {
+    std::vector<SubsetMatch> matches;
+    for (const PointStatus status : at_start)
+        matches.emplace_back().status = status == PointStatus::not_reached ? PointStatus::no_contrast : status;
+    return matches;
 }
 
 /// A subset that reaches over a crack matches neither side, and yet may correlate well. It shows in what is left of its
@@ -111,6 +115,11 @@ void CorrelateOptions::validate() const {
         throw InputError("command line", "--smoothing", fmt::format("{}", *smoothing), "must be from 0 to 20 pixels");
 }
 
+bool has_one_gray(const FinePicture& picture) {
+    const auto [least, most] = std::ranges::minmax_element(picture.gray);
+    return *least == *most;
+}
+
 Correlator::Correlator(FinePicture reference, const std::vector<std::uint8_t>& mask, const CorrelateOptions& options,
                        const std::string& name)
     : options_(options), reference_(checked(std::move(reference), options, name), options.smoothing),
@@ -123,12 +132,12 @@ void Correlator::check(const FinePicture& image, const std::string& name) const 
         throw InputError("command line", "image", name,
                          fmt::format("is {} x {} pixels, the reference {} x {}: all must have one size", image.columns,
                                      image.rows, reference.columns, reference.rows));
-    require_contrast(image, name);
 }
 
 DisplacementField Correlator::field(const FinePicture& image) const {
-    std::vector<SubsetMatch> matches =
-        spread_matches(reference_, image, lattice_, at_start_, options_.subset, options_.order, options_.threads);
+    std::vector<SubsetMatch> matches = has_one_gray(image) ? lost_matches(at_start_)
+                                                           : spread_matches(reference_, image, lattice_, at_start_,
+                                                                            options_.subset, options_.order, options_.threads);
     drop_torn(matches);
     DisplacementField field;
     const double lost = std::numeric_limits<double>::quiet_NaN();

@@ -22,6 +22,9 @@ struct CorrelateOptions {
     void validate() const;
 };
 
+/// Whether a picture shows nothing, as a frame that a camera dropped.
+bool has_one_gray(const FinePicture& picture);
+
 /// Displacement fields of images against one reference, by digital image correlation: each image is worked on by
 /// itself, and the same pictures give the same bits for any number of threads.
 class Correlator {
@@ -34,10 +37,10 @@ class Correlator {
 
     const PointLattice& lattice() const { return lattice_; }
 
-    /// Throws InputError, calling the image `name`, for one of another size than the reference or of one gray only.
+    /// Throws InputError, calling the image `name`, for one of another size than the reference.
     void check(const FinePicture& image, const std::string& name) const;
 
-    /// `image` must have passed `check`.
+    /// `image` must have passed `check`. In one of one gray only all points are lost for want of contrast.
     DisplacementField field(const FinePicture& image) const;
 
   private:

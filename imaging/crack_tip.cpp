@@ -18,15 +18,15 @@
 namespace crampfit {
 namespace {
 
-constexpr int terms = 14;                // of the series up to n = 4, for each component
-constexpr int more_terms = 22;           // up to n = 6
-constexpr int smooth_terms = 10;         // of a polynomial of third degree
-constexpr double unit = 100;             // length that r is counted in, so that the terms are of like size [px]
-constexpr int scan_points = 500;         // of the field that take part in the coarse search
-constexpr int scan_places = 13;          // along the longer side of the field
-constexpr int scan_angles = 16;          // around the circle
-constexpr int ring_subsets = 6;          // outer radius of the ring about the tip, in subsets
-constexpr double inner_share = 2.0 / 3;  // of that, of the ring that tells how much the tip depends on it
+constexpr int terms = 14;           // of the series up to n = 4, for each component
+constexpr int more_terms = 22;      // up to n = 6
+constexpr int smooth_terms = 10;    // of a polynomial of third degree
+constexpr double unit = 100;        // length that r is counted in, so that the terms are of like size [px]
+constexpr int scan_points = 500;    // of the field that take part in the coarse search
+constexpr int scan_places = 13;     // along the longer side of the field
+constexpr int scan_angles = 16;     // around the circle
+constexpr int ring_subsets = 6;     // outer radius of the ring about the tip, in subsets
+constexpr double other_ring = 1.5;  // factor to rings that tell how much the tip depends on it
 template <int count>
 constexpr int least_points = 4 * count + 4;  // of the series' terms
 // Of the F statistic. Points are neighbours and so depend on each other, and the best of many places is taken: fields
@@ -50,10 +50,14 @@ constexpr double widest_turn = 60.0 * std::numbers::pi / 180.0;
 template <int count>
 using Term = Eigen::RowVector<double, count>;
 using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 2>;
+/// On the stack, but in loops: factors of a fixed size are unrolled by the compiler, which takes half a minute over them.
+template <int count, int columns>
+using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, count, columns>;
 
 struct Sample {
     Vec2 place;         // [px]
     Vec2 displacement;  // [px]
+    double sigma;       // standard error of either of its components [px]
 };
 
 /// A straight crack: its tip and the direction that it points in.
@@ -119,7 +123,7 @@ std::vector<Sample> clear_of(const std::vector<Sample>& samples, const Line& lin
 /// What the series with its best coefficients leaves of the displacements [px].
 template <int count>
 Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
-    Eigen::Matrix<double, Eigen::Dynamic, count> rows(samples.size(), count);
+    Eigen::MatrixXd rows(samples.size(), count);
     Displacements right(samples.size(), 2);
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
         const Sample& sample = samples[static_cast<std::size_t>(i)];
@@ -133,8 +137,8 @@ Displacements residuals(const std::vector<Sample>& samples, const Line& line) {
 /// compare. Points nearer to the tip than `about_tip` and to the crack than `about_crack` take no part [px].
 template <int count>
 double scan_score(const std::vector<Sample>& samples, const Line& line, double about_tip, double about_crack) {
-    Eigen::Matrix<double, count, count> normal = Eigen::Matrix<double, count, count>::Zero();
-    Eigen::Matrix<double, count, 2> right = Eigen::Matrix<double, count, 2>::Zero();
+    Small<count, count> normal = Small<count, count>::Zero(count, count);
+    Small<count, 2> right = Small<count, 2>::Zero(count, 2);
     double squares = 0;
     int points = 0;
     for (const Sample& sample : samples) {
@@ -398,6 +402,41 @@ bool has_more(const std::vector<Sample>& samples, const Line& line, double overl
     return freedom > 0 && (without - with) / (2 * (more_terms - terms)) > least * overlap * with / freedom;
 }
 
+/// Share of what the series leaves that is no noise: near 0 where the series holds, near 1 in wood that it does not describe.
+template <int count>
+double misfit(const std::vector<Sample>& samples, const Line& line) {
+    const double freedom = 2.0 * static_cast<double>(samples.size()) - 2 * count - 2;
+    const double left = residuals<count>(samples, line).squaredNorm() / freedom;
+    double noise = 0;
+    for (const Sample& sample : samples) noise += sample.sigma * sample.sigma / static_cast<double>(samples.size());
+    return left > noise ? 1 - noise / left : 0;
+}
+
+/// By how much the tip moves with a ring of that radius [px]; a ring's radius at most, and not at all where it has too few
+/// points.
+template <int count>
+Vec2 move_with(const std::vector<Sample>& samples, const Line& line, int subset, double radius) {
+    const std::vector<Sample> clear = clear_of(within(samples, line.tip, radius), line, subset);
+    if (static_cast<int>(clear.size()) < least_points<count>) return Vec2::Zero();
+    Line again = line;
+    refine<count>(clear, again);
+    const Vec2 move = again.tip - line.tip;
+    return move.allFinite() ? Vec2(move * std::min(1.0, radius / move.norm())) : Vec2(radius * line.direction());
+}
+
+/// What the series misses is no noise: neighbours share it over lengths that are the wood's, and it leads the tip astray. Nothing
+/// in the wood asks for this ring and this number of terms: by how much the tip moves with each other choice is what it may be
+/// off by. In a smaller ring the series holds better, and that move counts in full; in a larger one or with the other number of
+/// terms it holds less well even in even wood, and these count by the share of what is left that is no noise.
+template <int count, int other>
+std::array<Vec2, 3> model_errors(const std::vector<Sample>& samples, const Line& line, int subset) {
+    const double ring = ring_subsets * subset;
+    const double share = std::sqrt(misfit<count>(clear_of(within(samples, line.tip, ring), line, subset), line));
+    return {move_with<count>(samples, line, subset, ring / other_ring),
+            share * move_with<count>(samples, line, subset, ring * other_ring),
+            share * move_with<other>(samples, line, subset, ring)};
+}
+
 /// Length of the crack's line from the picture's border to the tip [px].
 double length_in_picture(const Line& line, int columns, int rows) {
     const Vec2 back = -line.direction();
@@ -414,7 +453,7 @@ std::vector<Sample> followed(const PointLattice& lattice, const DisplacementFiel
     std::vector<Sample> samples;
     for (int point = 0; point < lattice.count(); ++point)
         if (const auto i = static_cast<std::size_t>(point); field.status[i] == PointStatus::ok)
-            samples.push_back({Vec2(lattice.x(point), lattice.y(point)), Vec2(field.u[i], field.v[i])});
+            samples.push_back({Vec2(lattice.x(point), lattice.y(point)), Vec2(field.u[i], field.v[i]), field.sigma[i]});
     return samples;
 }
 
@@ -495,21 +534,16 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         return found;
     }
     const Vec2 by_tip(0.5 * (length({1, 0}, 0) - length({-1, 0}, 0)), 0.5 * (length({0, 1}, 0) - length({0, -1}, 0)));
-    // What the series misses is no noise: its neighbours go along with it, and a smaller ring about the tip would say another
-    // place.
-    Vec2 model_error = Vec2::Zero();
-    const std::vector<Sample> nearer = clear_of(within(samples, line.tip, inner_share * ring), line, geometry.subset);
-    if (static_cast<int>(nearer.size()) >= (goes_on ? least_points<more_terms> : least_points<terms>)) {
-        Line again = line;
-        goes_on ? refine<more_terms>(nearer, again) : refine<terms>(nearer, again);
-        model_error = again.tip - line.tip;
-    }
+    const std::array<Vec2, 3> moves = goes_on ? model_errors<more_terms, terms>(samples, line, geometry.subset)
+                                              : model_errors<terms, more_terms>(samples, line, geometry.subset);
     // On either side the nearest whole subsets, which are a step of the lattice apart, end the directions that are as good.
     const double turned =
         std::min(fitted->turned / std::sqrt(3.0), lattice.step / (std::sqrt(24.0) * std::min(ring, found.length)));
     const double turn_error = 0.5 * (length(Vec2::Zero(), turned) - length(Vec2::Zero(), -turned));
     const auto error = [&](const Vec2& by) {
-        return std::hypot(std::sqrt(overlap * by.dot(fitted->covariance * by)), by.dot(model_error));
+        double square = overlap * by.dot(fitted->covariance * by);
+        for (const Vec2& move : moves) square += by.dot(move) * by.dot(move);
+        return std::sqrt(square);
     };
     found.tip_sigma = error(line.direction());
     found.sigma = std::hypot(error(by_tip), turn_error);

@@ -179,7 +179,10 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     state_->allowed.convertTo(weight, CV_32F, 1.0 / 255);
     const Alignment whole = line_up(reference, image, weight, {}, likely_motion);
     CrackTip found;
-    if (whole.residual > most_left * state_->contrast) {
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(image, &darkest, &brightest);
+    // An image of one gray, as a frame that a camera dropped, lies on anything.
+    if (darkest == brightest || whole.residual > most_left * state_->contrast) {
         found.status = TipStatus::not_lined_up;
         return found;
     }

@@ -19,9 +19,11 @@ constexpr int seed_every = 4;            // points of the lattice between those 
 constexpr double seed_zncc = 0.5;        // at whole pixels; the match that is begun there must reach more
 
 // Searches of the whole image, each of which takes as long as some thousand matches.
-constexpr std::size_t most_first = 24;  // for the first point
-constexpr int turns = 12;               // of the subset where it is not seen as it lies: 15 degrees are left, and 20 are followed
-constexpr std::size_t most_turned = 4;  // of the points, each at all turns
+constexpr std::size_t most_first = 24;    // for the first point
+constexpr int turns = 12;                 // of the subset where it is not seen as it lies, around the circle
+constexpr double most_off = 1;            // of a pixel at a subset's side from where a small turn has it [px]
+constexpr int most_between = 8;           // steps from one of the turns to the next: larger subsets have larger spots, too
+constexpr std::size_t most_turned = 4;    // of the points, each at all turns
 constexpr std::size_t most_of_parts = 4;  // for each part of the specimen that nothing has spread to
 constexpr std::size_t most_parts = 8;     // the largest
 
@@ -61,14 +63,28 @@ class Spreading {
     bool nothing_found() const { return low_u_ > high_u_; }
     cv::Rect whole_image() const { return {0, 0, image_.columns, image_.rows}; }
 
-    /// The first point: in the whole image, as the subset lies and then turned.
+    /// The first point: in the whole image, as the subset lies, then turned a little either way by small steps, as fine spots ask
+    /// for, and then all around by large ones.
     void begin_anywhere(const std::vector<int>& all) {
         const std::size_t every = (all.size() + most_first - 1) / most_first;
         for (std::size_t i = 0; i < all.size() && nothing_found(); i += every) begin_from(all[i], whole_image());
-        const std::size_t every_turned = (all.size() + most_turned - 1) / most_turned;
-        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every_turned)
-            for (int turn = 1; turn < turns && nothing_found(); ++turn) {
-                turn_ = 2 * std::numbers::pi * turn / turns;
+        constexpr double apart = 2 * std::numbers::pi / turns;
+        const int steps = std::min(most_between, static_cast<int>(std::ceil(apart * half_ / (2 * most_off))));
+        std::vector<double> angles;
+        for (int step = 1; step < steps; ++step) angles.insert(angles.end(), {apart * step / steps, -apart * step / steps});
+        begin_turned(all, angles);
+        angles.clear();
+        for (int turn = 1; turn < turns; ++turn) angles.push_back(apart * turn);
+        begin_turned(all, angles);
+    }
+
+    void begin_turned(const std::vector<int>& all, const std::vector<double>& angles) {
+        const std::size_t every = (all.size() + most_turned - 1) / most_turned;
+        for (std::size_t i = 0; i < all.size() && nothing_found(); i += every)
+            for (std::size_t turn = 0; turn < angles.size() && nothing_found(); ++turn) {
+                turn_ = angles[turn];
+                // A match that was begun from a wrong turn and failed says nothing of the next.
+                if (may_be_tried(all[i])) matches_[index(all[i])].status = PointStatus::not_reached;
                 begin_from(all[i], whole_image());
             }
     }

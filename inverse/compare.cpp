@@ -1,10 +1,13 @@
 #include "inverse/compare.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string>
 
 namespace crampfit {
 namespace {
@@ -66,6 +69,39 @@ void weigh(std::vector<ComparedModel>& models, const std::vector<double>& spread
     std::stable_sort(models.begin(), models.end(), [](const auto& a, const auto& b) { return a.aic < b.aic; });
 }
 
+std::string weight_text(double weight) { return weight > 0.99 ? "more than 0.99" : fmt::format("{:.2g}", weight); }
+
+// What the data say of the best two; `on_wide_cells`: of each model -2 ln of its likelihood there, as far as that is known.
+std::string verdict(const std::string& key, const std::vector<ComparedModel>& models,
+                    const std::map<std::string, double>& on_wide_cells) {
+    constexpr double plain = 2;  // of AIC: less, and both have support (Burnham and Anderson 2002, section 2.6)
+    const ComparedModel &first = models[0], &second = models[1];
+    if (second.aic - first.aic <= plain) {
+        return fmt::format("The data do not tell {} \"{}\" from \"{}\": {} and {} of the evidence. ", key, first.name,
+                           second.name, weight_text(first.weight), weight_text(second.weight));
+    }
+    std::string text = fmt::format("{} \"{}\" explains the data best, with {} of the evidence; next \"{}\" with {}. ", key,
+                                   first.name, weight_text(first.weight), second.name, weight_text(second.weight));
+    // What a grid half as fine changes may be left on this one (left_by_grid).
+    std::vector<std::string> close;
+    const auto wide = [&](const ComparedModel& model) {
+        const auto found = on_wide_cells.find(model.name);
+        return found == on_wide_cells.end() ? std::nan("") : found->second;
+    };
+    for (const ComparedModel& other : models) {
+        const double here = other.aic - first.aic, there = wide(other) - wide(first);
+        if (std::abs(there - here) > here) {
+            close.push_back(fmt::format("\"{}\" ({:+.2g} there, {:+.2g} here)", other.name, there, here));
+        }
+    }
+    if (!close.empty()) {
+        text += fmt::format(
+            "The grid may decide that: by cells twice as wide AIC tells it otherwise from {}. Finer cells would tell. ",
+            fmt::join(close, ", "));
+    }
+    return text;
+}
+
 }  // namespace
 
 Study model_of(const Study& study, std::size_t model) {
@@ -84,11 +120,14 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     Fit best;
     std::vector<ComparedModel> models;
+    std::map<std::string, double> on_wide_cells;
     std::vector<double> spreads;  // beyond that of the sharpest model
     double unexplained = std::numeric_limits<double>::infinity(), seconds = 0;
     bool interrupted = false;
     for (std::size_t i = 0; i < study.models.size() && !interrupted; ++i) {
-        Fit fit = fit_study(model_of(study, i), options_of(study, i, options));
+        FitOptions own = options_of(study, i, options);
+        own.tell_wide_deviance = [&, i](double deviance) { on_wide_cells[study.models[i].name] = deviance; };
+        Fit fit = fit_study(model_of(study, i), own);
         models.push_back(compared(study.models[i].name, fit));
         spreads.push_back(fit.residuals.empty() ? std::numeric_limits<double>::infinity() : spread(fit));
         unexplained = std::min(unexplained, fit.reduced_chi_square);
@@ -104,12 +143,6 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     weigh(models, spreads, std::max(1.0, unexplained), best.residuals.size());
     if (models.size() > 1) {
-        constexpr double plain = 2;  // of AIC: less, and both have support (Burnham and Anderson 2002, section 2.6)
-        const ComparedModel &first = models[0], &second = models[1];
-        const char* verdict =
-            second.aic - first.aic > plain
-                ? "{0} \"{1}\" explains the data best, with {2:.2g} of the evidence; next \"{3}\" with {4:.2g}. {5}"
-                : "The data do not tell {0} \"{1}\" from \"{3}\": {2:.2g} and {4:.2g} of the evidence. {5}";
         std::string failed;
         for (const ComparedModel& model : models) {
             if (!std::isfinite(model.aic)) {
@@ -119,13 +152,10 @@ Fit fit_models(const Study& study, const FitOptions& options) {
         if (!failed.empty()) {
             failed = "Of " + failed + " no run ended well, so that nothing is said of it. ";
         }
-        if (std::isfinite(second.aic)) {
-            best.message = fmt::format(fmt::runtime(verdict), study.compared_key, first.name, first.weight, second.name,
-                                       second.weight, failed + best.message);
-        } else {
-            best.message = fmt::format("{} \"{}\" has nothing to be compared with. {}{}", study.compared_key, first.name, failed,
-                                       best.message);
-        }
+        const std::string said = std::isfinite(models[1].aic) ? verdict(study.compared_key, models, on_wide_cells)
+                                                              : fmt::format("{} \"{}\" has nothing to be compared with. ",
+                                                                            study.compared_key, models[0].name);
+        best.message = said + failed + best.message;
     }
     best.models = std::move(models);
     best.seconds = seconds;

@@ -328,6 +328,9 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                             100 * model.resolution());
         }
     }
+    if (options.tell_wide_deviance && by_walks && !objective.stopped() && (has_begun || before.descend(stage, true))) {
+        options.tell_wide_deviance(before.deviance());
+    }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);
     return fit;

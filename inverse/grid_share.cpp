@@ -20,7 +20,7 @@ namespace {
 constexpr double resolved = 1e-3;
 
 // Of a parameter's size: farther off, the wide cells are not near enough to the truth for errors to go with a power of the
-// cell, nor slopes at the best point for the way there.
+// cell, nor slopes at the best point for the way there. From there to twice as far what is told of the others loses its weight.
 constexpr double farthest_told = 0.1;
 
 // Of a toughness: what is left where two grids happen to agree.
@@ -102,6 +102,31 @@ Eigen::MatrixXd stretches_of(const Eigen::VectorXd& change, const std::vector<Fi
     return found;
 }
 
+// Takes in what the grid leaves as far as it is trusted, from 1 to 0, and else a tenth of each parameter by itself. `left` to
+// either side, but not more than that tenth [parameters, of the unit cube].
+void take_in(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Eigen::VectorXd& left, double trust) {
+    Eigen::VectorXd own(box.size());  // in the parameters' units
+    for (Eigen::Index j = 0; j < box.size(); ++j) {
+        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
+        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
+        const double most = farthest_told * size_of(parameter, box.value(j, x[j])) / box.slope(j, x[j]);
+        const double by = std::lerp(most, std::min(std::abs(left[j]), most), trust);
+        go_on(box, j, fitted.lower_95, -by);
+        go_on(box, j, fitted.upper_95, by);
+        own[j] = slope_in_unit(box, j, x) * std::copysign(by, left[j]);
+    }
+    Eigen::MatrixXd more = trust * own * own.transpose();
+    more.diagonal() = own.cwiseAbs2();
+    add_covariance(fit, more / 3.0);  // the mean square of what is spread evenly, from 0 to 1 or from -1 to 1
+}
+
+std::string untold_grid(const std::string& why) {
+    return fmt::format(
+        "What the grid leaves cannot be told: {}. Intervals go on by up to a tenth of the value to either side for "
+        "it, which may be too little: finer cells would tell. ",
+        why);
+}
+
 }  // namespace
 
 Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& best, Evaluation wide, const Uncertainty& about) {
@@ -146,38 +171,31 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left) {
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
-    bool is_near = true;
+    double farthest = 0.0;  // of what can be told
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
-        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
-        if (is_whole_box(parameter, fit.parameters[static_cast<std::size_t>(j)])) {
-            continue;
-        }
-        is_near = is_near && std::abs(shifts[j]) <= farthest_told * size_of(parameter, values[j]);
-        told.push_back(shift_text(parameter, values[j], shifts[j]));
-    }
-    if (told.empty()) {
-        return;
-    }
-    if (!is_near) {
-        const std::string why = "a fit on cells twice as wide, which would tell it, lies too far off: ";
-        take_in_untold_grid(fit, box, x, why + fmt::format("{}", fmt::join(told, ", ")));
-        return;
-    }
-    Eigen::VectorXd own(box.size());  // in the parameters' units
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
         const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
         if (is_toughness(parameter)) {
             const double least = least_of_toughness * values[j] / box.slope(j, x[j]);
             left[j] = std::copysign(std::max(std::abs(left[j]), least), left[j]);
         }
-        go_on(box, j, fitted.lower_95, -std::abs(left[j]));
-        go_on(box, j, fitted.upper_95, std::abs(left[j]));
-        own[j] = slope_in_unit(box, j, x) * left[j];
+        if (is_whole_box(parameter, fit.parameters[static_cast<std::size_t>(j)])) {
+            continue;
+        }
+        farthest = std::max(farthest, std::abs(shifts[j]) / (farthest_told * size_of(parameter, values[j])));
+        told.push_back(shift_text(parameter, values[j], shifts[j]));
+    }
+    if (told.empty()) {
+        return;
     }
     const Eigen::VectorXd of_data = fit.covariance.diagonal();
-    add_covariance(fit, own * own.transpose() / 3.0);  // the mean square of what is spread evenly from 0 to 1
+    const double trust = std::clamp(2.0 - farthest, 0.0, 1.0);
+    take_in(fit, box, x, left, trust);
+    if (farthest > 1.0) {
+        fit.message += untold_grid(
+            fmt::format("a fit on cells twice as wide, which would tell it, lies too far off: {}", fmt::join(told, ", ")));
+        return;
+    }
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();
     fit.message +=
         fmt::format("By what the grid leaves, told by a run on cells twice as wide, the truth may lie farther off: {}. "
@@ -186,20 +204,8 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen:
 }
 
 void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why) {
-    Eigen::VectorXd own(box.size());  // in the parameters' units
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
-        const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
-        const double by = farthest_told * size_of(parameter, box.value(j, x[j])) / box.slope(j, x[j]);
-        go_on(box, j, fitted.lower_95, -by);
-        go_on(box, j, fitted.upper_95, by);
-        own[j] = slope_in_unit(box, j, x) * by;
-    }
-    add_covariance(fit, Eigen::MatrixXd(own.cwiseAbs2().asDiagonal()) / 3.0);  // of what is spread evenly from -1 to 1
-    fit.message +=
-        fmt::format("What the grid leaves cannot be told: {}. Intervals go on by a tenth of the value to either side for "
-                    "it, which may be too little: finer cells would tell. ",
-                    why);
+    take_in(fit, box, x, Eigen::VectorXd::Zero(box.size()), 0.0);
+    fit.message += untold_grid(why);
 }
 
 }  // namespace crampfit

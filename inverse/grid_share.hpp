@@ -25,12 +25,12 @@ Eigen::VectorXd left_by_grid(const Study& study, StudyModel model, const Run& be
 /// Takes what the grid leaves into the fit: each interval goes on by it to either side, and covariance and standard errors count
 /// it as spread evenly up to there, squares about the best point. Of a toughness two grids that happen to agree leave 1 % all the
 /// same: loads into another wood are off by up to 0.7 % then (docs/accuracy.md), and toughness goes with their square. Where it
-/// goes beyond a tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told. Of a
+/// goes beyond a tenth of a parameter's value or, on a linear scale, of half its box if that is more, it cannot be told: that
+/// tenth counts, and of the others ever more of theirs, up to twice as far off, where all do, each parameter's by itself. Of a
 /// parameter that the data do not tell, whose interval is its whole box, nothing is asked. The message says it.
 void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen::VectorXd left);
 
-/// Where what the grid leaves cannot be told, and why: all intervals go on by that tenth to either side, and errors spread evenly
-/// up to there count, each parameter's by itself.
+/// Where nothing tells what the grid leaves, and why: as from twice as far off.
 void take_in_untold_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const std::string& why);
 
 }  // namespace crampfit

@@ -164,6 +164,11 @@ void check_growth(const Experiment& test) {
     }
     std::vector<double> lengths;
     std::ranges::copy_if(test.data.crack_length, std::back_inserter(lengths), [](double length) { return !std::isnan(length); });
+    if (test.scene.cracks.empty() && !lengths.empty() && std::ranges::max(lengths) > 0.0) {
+        throw InputError(
+            file_of(test), "cracks", "none",
+            fmt::format("{} tells how long a crack is: give the scene one, or leave the column out", data_file_of(test)));
+    }
     if (lengths.size() < 2) {
         return;
     }

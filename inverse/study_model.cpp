@@ -75,39 +75,45 @@ double StudyModel::change_of_sigma(double resolution) const {
     return most;
 }
 
-double StudyModel::likely_resolution(const Evaluation& evaluation, double most) const {
-    constexpr double least = 1e-5;  // far below what any grid or gauge knows
-    constexpr int steps = 40;
+double StudyModel::deviance(const Evaluation& evaluation, double resolution) const {
     double measurements = 0;
     for (const Comparison& comparison : comparisons_) {
         measurements += std::accumulate(comparison.counts().begin(), comparison.counts().end(), 0.0);
     }
     const double share = 1.0 - static_cast<double>(box_.size()) / measurements;  // of them that the fit leaves free
-    const auto deviance = [&](double resolution) {                               // -2 ln L
-        double sum = 0;
-        Eigen::Index row = 0;
-        for (std::size_t i = 0; i < comparisons_.size(); ++i) {
-            const Comparison& comparison = comparisons_[i];
-            const Eigen::VectorXd sigmas = comparison.sigmas(resolution);
-            for (std::size_t k = 0; k < comparison.stations().size(); ++k) {
-                const double sigma = sigmas[static_cast<Eigen::Index>(k)];
-                const double off = evaluation.modelled[row++] - comparison.stations()[k].measured;
-                const double r = softened(off / sigma, study_.optimizer.loss);
-                sum += study_.experiments[i].weight * (r * r + share * comparison.counts()[k] * 2 * std::log(sigma));
-            }
-        }
-        return sum;
-    };
-    double likely = 0, lowest = deviance(0.0);
-    for (int i = 0; i <= steps && most > least; ++i) {
-        const double resolution = least * std::pow(most / least, static_cast<double>(i) / steps);
-        const double here = deviance(resolution);
-        if (here < lowest) {
-            lowest = here;
-            likely = resolution;
+    double sum = 0;
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < comparisons_.size(); ++i) {
+        const Comparison& comparison = comparisons_[i];
+        const Eigen::VectorXd sigmas = comparison.sigmas(resolution);
+        for (std::size_t k = 0; k < comparison.stations().size(); ++k) {
+            const double sigma = sigmas[static_cast<Eigen::Index>(k)];
+            const double off = evaluation.modelled[row++] - comparison.stations()[k].measured;
+            const double r = softened(off / sigma, study_.optimizer.loss);
+            sum += study_.experiments[i].weight * (r * r + share * comparison.counts()[k] * 2 * std::log(sigma));
         }
     }
+    return sum;
+}
+
+StudyModel::Knowledge StudyModel::likely_knowledge(const Evaluation& evaluation, double most) const {
+    constexpr double least = 1e-5;  // far below what any grid or gauge knows
+    constexpr int steps = 40;
+    Knowledge likely{0.0, deviance(evaluation, 0.0)};
+    for (int i = 0; i <= steps && most > least; ++i) {
+        const double resolution = least * std::pow(most / least, static_cast<double>(i) / steps);
+        const double here = deviance(evaluation, resolution);
+        if (here < likely.deviance) {
+            likely = {resolution, here};
+        }
+    }
+    likely.deviance +=
+        evaluation.residuals.tail(evaluation.residuals.size() - evaluation.modelled.size()).squaredNorm();  // priors
     return likely;
+}
+
+double StudyModel::likely_resolution(const Evaluation& evaluation, double most) const {
+    return likely_knowledge(evaluation, most).resolution;
 }
 
 Evaluation StudyModel::at(const Eigen::VectorXd& values, int threads) const {

@@ -53,6 +53,12 @@ class StudyModel {
     /// variance component estimation, J. Am. Stat. Assoc. 72).
     double likely_resolution(const Evaluation& evaluation, double most) const;
 
+    /// That resolution and how likely residuals are by it: -2 ln of the likelihood and of what priors say, but for a constant.
+    struct Knowledge {
+        double resolution, deviance;
+    };
+    Knowledge likely_knowledge(const Evaluation& evaluation, double most) const;
+
     const UnitBox& box() const { return box_; }
     std::size_t residual_count() const;  // of the data, and one a prior
     MeasuredCurves curves() const;
@@ -61,6 +67,7 @@ class StudyModel {
 
   private:
     std::size_t station_count() const;
+    double deviance(const Evaluation& evaluation, double resolution) const;  // of the data
 
     const Study& study_;
     std::vector<Experiment> tests_;      // with what runs can be compared with

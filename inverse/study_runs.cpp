@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -20,6 +21,11 @@ constexpr double nothing_left = 1e-6;  // of what noise leaves
 
 constexpr int most_weighings = 6;     // by another resolution of the model
 constexpr double least_change = 0.1;  // of a sigma, that they are made for
+
+constexpr std::array<double, 2> better_known{0.0, 0.25};  // of a resolution: may the model know that well what it says?
+constexpr double more_likely = 0.1;                       // in -2 ln of a likelihood
+constexpr int most_steps_beside = 3;
+constexpr double least_step = 1e-3;  // of the misfit: a thirtieth of a standard error
 
 // All that the lowest point of a cheap model hangs on beyond what the runs do.
 std::uint64_t what_is_asked(const Study& study, const std::vector<double>& point, const Window& window, bool rough,
@@ -147,8 +153,16 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     const auto is_enough = [enough](const Evaluation& best) { return best.misfit < enough; };
     SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
     found.converged = heed_data(weigh_and_descend(found.converged, enough > 0), [this] { return descend_again(); });
+    const bool is_fine = widening_ == 1.0;
+    if (is_fine) {
+        const auto look = [this] {
+            for (int step = 0; step < most_steps_beside && step_beside(objective_, nearby_, more_likely, options_.seed); ++step) {
+            }
+        };
+        found.converged = know_better(found.converged, look, [this] { return weigh_and_descend(true, true); });
+    }
     if (!nearby_.turning.empty() && objective_.best()) {
-        const bool is_fine = widening_ == 1.0, goes_on = starts == 1;  // from a search on wide cells
+        const bool goes_on = starts == 1;  // from a search on wide cells
         for (const double reach : {all_ways, ways_about, ways_beside}) {
             if ((reach == all_ways ? !goes_on : is_fine) && is_left_over()) {
                 stage("other ways");
@@ -163,6 +177,8 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
             found.converged = found.converged && close_in(objective_, nearby_, options_.seed) && weigh_and_descend(true, false);
             found.method += " The last steps took in how the parameters turn the crack, told by runs a little aside.";
         }
+    } else if (is_fine && found.converged) {
+        settle();
     }
     return found;
 }
@@ -204,6 +220,7 @@ SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::functi
         return converged;
     };
     found.converged = heed_data(weigh(found.converged), [&] { return weigh(go_on()); });
+    found.converged = know_better(found.converged, go_on, [&] { return weigh(go_on()); });
     return found;
 }
 
@@ -242,6 +259,47 @@ bool StudyRuns::heed_data(bool converged, const std::function<bool()>& descend) 
     model_.count_priors(true);
     judge_runs();
     return descend();
+}
+
+// Where a run leaves much the model seems to know little, by which that run fits: a search that believes it ends there, though
+// next to it the model may know more. `look` looks for a lower point as a model weighs it that does, and `descend` goes on from
+// there, where the residuals, by what they say of the model themselves, are likelier.
+bool StudyRuns::know_better(bool converged, const std::function<void()>& look, const std::function<bool()>& descend) {
+    if (!converged || model_.change_of_sigma(0.0) <= least_change) {
+        return converged;
+    }
+    const double resolution = model_.resolution();
+    const auto deviance = [this] { return model_.likely_knowledge(*objective_.best()->evaluation, most_resolution_).deviance; };
+    const double before = deviance();
+    const auto weigh = [this](double by) {
+        model_.set_resolution(by);
+        judge_runs();
+    };
+    for (const double share : better_known) {
+        weigh(share * resolution);
+        look();
+        if (objective_.stopped()) {
+            break;
+        }
+        if (deviance() < before - more_likely) {
+            weigh(model_.likely_resolution(*objective_.best()->evaluation, most_resolution_));
+            const bool ended = descend();
+            if (deviance() < before - more_likely) {
+                return ended;
+            }
+        }
+    }
+    weigh(resolution);
+    return converged;
+}
+
+// The last steps: by what the model knows there, to the lowest point, however little they gain.
+void StudyRuns::settle() {
+    weigh_anew(0.0);
+    const Evaluation& best = *objective_.best()->evaluation;
+    const double least = least_step * std::max(1.0, best.misfit / static_cast<double>(best.residuals.size()));
+    for (int step = 0; step < most_steps_beside && step_beside(objective_, nearby_, least, options_.seed); ++step) {
+    }
 }
 
 // Whether more than noise is left, or hardly any: then the data may hold what another way would explain.

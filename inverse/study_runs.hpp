@@ -62,6 +62,8 @@ class StudyRuns {
     bool is_left_over() const;
     bool descend_as_weighed(bool last);
     bool weigh_and_descend(bool converged, bool ended_early);
+    bool know_better(bool converged, const std::function<void()>& look, const std::function<bool()>& descend);
+    void settle();
     Evaluation run(const Eigen::VectorXd& x, int share);
     Eigen::VectorXd key_of(const Eigen::VectorXd& values) const;
 

@@ -398,6 +398,20 @@ bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, uns
     return objective.best()->evaluation->misfit < here.evaluation->misfit;
 }
 
+bool step_beside(Objective& objective, const Nearby& nearby, double least, unsigned seed) {
+    if (objective.exhausted()) {
+        return false;
+    }
+    const Run here = *objective.best();
+    const Window window = Window::around(here.x, Eigen::VectorXd::Constant(here.x.size(), last_radius));
+    const Lowest trial = lowest_near(here.x, nearby, false, window, objective, seed);
+    if (here.evaluation->misfit - trial.misfit <= least) {
+        return false;
+    }
+    objective.at(trial.x);
+    return objective.best()->evaluation->misfit < here.evaluation->misfit;
+}
+
 bool descend_again(Objective& objective, const Nearby& nearby, const Enough& enough, unsigned seed) {
     const Eigen::VectorXd start = objective.best()->x;
     const Descent descent = descend_from(objective, nearby, start, enough, seed);

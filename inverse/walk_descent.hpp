@@ -60,6 +60,10 @@ bool look_for_ways(Objective& objective, const Nearby& nearby, double reach, uns
 std::optional<Run> descend_held(Objective& objective, const Nearby& nearby, const Eigen::VectorXd& start, Eigen::Index held,
                                 unsigned seed);
 
+/// One step beside the best run, to the lowest point of what lies nearby, however little lower that is but for `least` of the
+/// misfit. Whether a run there was lower.
+bool step_beside(Objective& objective, const Nearby& nearby, double least, unsigned seed);
+
 /// One more such descent from the best run, after runs have been weighed anew. Whether it ended by its own criterion, or early.
 bool descend_again(Objective& objective, const Nearby& nearby, const Enough& enough, unsigned seed);
 

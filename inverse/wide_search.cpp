@@ -22,9 +22,9 @@ double cells_of(const Scene& scene) {
 WideSearch::WideSearch(const Study& study, const FitOptions& options, RunStore& store, std::function<void()> look)
     : study_(on_wide_cells(study)), options_(options), store_(store), look_(std::move(look)) {}
 
-bool WideSearch::descend(const std::function<void(const std::string&)>& stage) {
+bool WideSearch::descend(const std::function<void(const std::string&)>& stage, bool anyway) {
     const auto is_small = [](const Experiment& experiment) { return 4 * cells_of(experiment.scene) < least_cells; };
-    if (std::all_of(study_.experiments.begin(), study_.experiments.end(), is_small)) {
+    if (!anyway && std::all_of(study_.experiments.begin(), study_.experiments.end(), is_small)) {
         return false;
     }
     try {
@@ -38,6 +38,12 @@ bool WideSearch::descend(const std::function<void(const std::string&)>& stage) {
     }
     runs_->descend([&](const std::string& name) { stage(name + " on cells twice as wide"); });
     return runs_->objective().best() != nullptr;
+}
+
+double WideSearch::deviance() const {
+    const Run* const best = runs_ ? runs_->objective().best() : nullptr;
+    return best ? runs_->model().likely_knowledge(*best->evaluation, solver_resolution).deviance
+                : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::string WideSearch::method() const {

@@ -18,9 +18,13 @@ class WideSearch {
     /// All that is given must outlive this. `look` is called after each run.
     WideSearch(const Study& study, const FitOptions& options, RunStore& store, std::function<void()> look);
 
-    /// Searches as `StudyRuns::descend` does, from the study's own starting points. False where that is not worth while, or where
-    /// it found nothing.
-    bool descend(const std::function<void(const std::string&)>& stage);
+    /// Searches as `StudyRuns::descend` does, from the study's own starting points. False where that is not worth while, but for
+    /// `anyway`, or where it found nothing.
+    bool descend(const std::function<void(const std::string&)>& stage, bool anyway = false);
+
+    /// What its best point makes of the data, -2 ln of the likelihood but for a constant; not a number where nothing was
+    /// searched.
+    double deviance() const;
 
     /// Its best point, where it found one [parameters], of the unit cube.
     const Eigen::VectorXd& best() const { return runs_->objective().best()->x; }

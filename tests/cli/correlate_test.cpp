@@ -69,7 +69,6 @@ TEST(SystemCorrelate, BadPicturesAreNamed) {
     const std::map<std::string, std::string> bad{
         {file("empty.pgm", ""), "empty"},
         {file("one.pgm", "P5\n1 1\n255\nx"), ""},
-        {file("black.pgm", "P5\n240 200\n255\n" + black), "gray 0 only"},
         {file("short.pgm", whole.substr(0, whole.size() / 2)), "cut short"},
         {file("huge.pgm", huge), "2^28 pixels"},
         {file("huge.png", "\x89PNG\r\n\x1a\n" + std::string("\0\0\0\rIHDR", 8) + big_endian(30000) + big_endian(30000)),
@@ -87,10 +86,17 @@ TEST(SystemCorrelate, BadPicturesAreNamed) {
         }
         EXPECT_EQ(command.run({"correlate", name, good, "-o", command.path("out.h5")}).status, 2) << name;
     }
+    const std::string dropped = file("black.pgm", "P5\n240 200\n255\n" + black);
+    EXPECT_TRUE(contains(command.run({"correlate", dropped, good, "-o", command.path("out.h5")}).error, "gray 0 only"));
     EXPECT_EQ(command.run({"correlate", good, good, "-o", good}).status, 2);
     EXPECT_EQ(command.run({"correlate", good, good, "-o", command.path("out.h5"), "--pixel", "10"}).status, 2);
     EXPECT_EQ(command.run({"correlate", good, good, "-o", command.path("out.h5"), "--set", "a=1"}).status, 2);
     EXPECT_FALSE(std::filesystem::exists(command.path("out.h5")));
+    for (const char* verb : {"correlate", "track"}) {  // a frame that the camera dropped is lost, and the others are not
+        const Outcome outcome = command.run({verb, good, dropped, good, "-o", command.path("out.h5")});
+        EXPECT_EQ(outcome.status, 0) << verb;
+        EXPECT_TRUE(contains(outcome.error, "black.pgm: has gray 0 only and counts as lost")) << outcome.error;
+    }
 }
 
 TEST(SystemTrack, SeriesAndExperiment) {

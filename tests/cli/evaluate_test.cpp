@@ -157,4 +157,11 @@ TEST(SystemCommand, EvaluateTellsDakotaOfFailures) {
     EXPECT_TRUE(contains(outcome.error, "is no parameter of the study")) << outcome.error;
     EXPECT_TRUE(contains(command.folder.read("results.out"), "fail: ")) << "no answer to an earlier question";
     EXPECT_TRUE(contains(command.folder.read("results.out"), "is no parameter of the study"));
+    command.folder.write("study.toml", "scene = \"nowhere.toml\"\noutputs = [\"peak force\"]\n" + parameters);
+    command.folder.write("results.out", "0.5 peak_force\n");
+    EXPECT_EQ(command.evaluate(request("90", "60", {1})).status, 2);
+    EXPECT_TRUE(contains(command.folder.read("results.out"), "fail: ")) << command.folder.read("results.out");
+    command.folder.write("results.out", "displacement [mm],force [N]\n");  // what may be something else stays
+    EXPECT_EQ(command.evaluate(request("90", "60", {1})).status, 2);
+    EXPECT_TRUE(contains(command.folder.read("results.out"), "displacement"));
 }

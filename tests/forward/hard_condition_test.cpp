@@ -33,7 +33,7 @@ Matrix stiffness(const AtRest& run) {
     const std::vector<Vec2> still(cracks.fields(), Vec2::Zero());
     for (int c = 0; c < run.body.layout.cells(); ++c)
         for_groups(points, c, [&](const PointGroup& group) {
-            add_element(points.node[group.first], internal.tangent(group.first, group.count, still, false));
+            add_element(points.node[group.point[0]], internal.tangent(group, still, false));
         });
     for (const Sliver& sliver : run.body.slivers) {
         const auto [own, less] = internal.tangents(sliver, still, false);

@@ -401,6 +401,14 @@ TEST(HardMirror, CrackThroughRingsGoesTheSameWay) {
     check_images("rings 30 : 1, energy release rate", rings);
 }
 
+// Lines of the grid that are counted in pairs from one side are others from the other where cells are odd in number.
+TEST(HardMirror, CrackTowardsSharpLatewoodGoesTheSameWayOnAnOddNumberOfCells) {
+    RingScene rings;
+    rings.size = {8.25e-3, 6.15e-3};  // 41 x 31 cells, none quite square
+    rings.transition = 0.0;
+    check_images("41 x 31 cells, rings 30 : 1", rings);
+}
+
 // Of two and three cracks the tips come near each other, and run through each other's surroundings.
 TEST(HardMirror, SeveralCracksThroughRingsGoTheSameWay) {
     RingScene rings;

@@ -75,6 +75,25 @@ TEST(VerificationLocalYield, OverAnEdgeOfLatewood) {
     EXPECT_LT(worst, 0.05);
 }
 
+// All lengths so much larger, but for the thickness, and the specimen so much wider: then the force is as much larger, and hangs
+// on no last digits. Of a specimen that is wider by 1e-8 it changes by about that. With these factors rounding lets a length come
+// out less than the whole number of facets or cells that it is.
+TEST(VerificationLocalYield, TheForceHangsOnNoLastDigits) {
+    const auto pushed = [](double larger, double wider) {
+        Scene scene = rolled(larger * 0.1e-3, 0.0);
+        scene.specimen.size = larger * Vec2((1 + wider) * 3e-3, 3e-3);
+        scene.bodies[0].shape = Circle{larger * Vec2(1.37e-3, 3.5e-3), larger * 0.5e-3};
+        scene.stop.time = larger * 0.1e-3;
+        return force(scene, larger * 0.04e-3) / larger;
+    };
+    const double as_is = pushed(1.0, 0.0);
+    for (const auto& [larger, wider] : {std::pair{1.0, 1e-8}, {1.0, -1e-8}, {1.07, 0.0}, {1.2, 0.0}, {0.71, 0.0}, {1.32, 0.0}}) {
+        const double off = pushed(larger, wider) / as_is - 1;
+        std::printf("%.2f times as large, wider by %+.0e: force off by %+.1e\n", larger, wider, off);
+        EXPECT_LT(std::abs(off), 1e-6);
+    }
+}
+
 TEST(GradientLocalYield, OfEnergyAndForce) {
     // Of energy and force at the wheel, by all numbers of woods and of the transition between them; central differences.
     Scene scene = rolled_over_latewood(0.2e-3, 1.4e-3);

@@ -377,6 +377,51 @@ TEST(VerificationCorrelate, TurnedByMoreThanASubsetIsFoundAt) {
     }
 }
 
+// Subsets of fine spots are recognised only where they are turned nearly right. Points whose subset, turned, stays in the
+// picture.
+TEST(VerificationCorrelate, FineSpotsAreFoundTurned) {
+    for (const double spot : {1.0, 1.6, 3.0}) {
+        VirtualCameraOptions camera_options;
+        camera_options.columns = camera_options.rows = 240;
+        camera_options.spot_radius = spot;
+        const VirtualCamera camera(camera_options);
+        const Vec2 middle(120, 120);
+        for (const int subset : {21, 31}) {
+            if (subset < 8 * spot) continue;  // too few spots to know a turn by
+            CorrelateOptions options;
+            options.subset = subset;
+            const Correlator correlator(fine(camera.photograph(0)), {}, options, "reference");
+            const PointLattice& lattice = correlator.lattice();
+            for (const double degrees : {-26.0, -17.0, -13.0, 15.0, 19.0, 24.0}) {
+                const Eigen::Rotation2D<double> turn(degrees * std::numbers::pi / 180);
+                const auto move = [&](const Vec2& place) { return Vec2(middle + turn * (place - middle) - place); };
+                const DisplacementField field = correlator.field(fine(camera.photograph(move, 1)));
+                int inside = 0, found = 0;
+                for (int point = 0; point < lattice.count(); ++point) {
+                    const Vec2 place(lattice.x(point), lattice.y(point));
+                    if ((place + move(place) - middle).cwiseAbs().maxCoeff() + 0.75 * subset > 120) continue;
+                    const auto i = static_cast<std::size_t>(point);
+                    ++inside;
+                    found += field.status[i] == PointStatus::ok && (Vec2(field.u[i], field.v[i]) - move(place)).norm() < 0.1;
+                }
+                EXPECT_GT(found, 0.98 * inside)
+                    << "spots of " << spot << " px, subset " << subset << ", " << degrees << " degrees";
+            }
+        }
+    }
+}
+
+// A frame that a camera dropped is one picture lost among others.
+TEST(UnitCorrelate, NothingIsFollowedInAPictureOfOneGray) {
+    const VirtualCamera camera({.columns = 120, .rows = 120});
+    const Correlator correlator(fine(camera.photograph(0)), {}, {}, "reference");
+    FinePicture black = fine(camera.photograph(1));
+    std::ranges::fill(black.gray, 0.0f);
+    EXPECT_NO_THROW(correlator.check(black, "black.png"));
+    EXPECT_EQ(std::ranges::count(correlator.field(black).status, PointStatus::no_contrast), correlator.lattice().count());
+    EXPECT_THROW(Correlator(black, {}, {}, "black.png"), InputError);
+}
+
 // A few pixels that show something else are no crack.
 TEST(VerificationCorrelate, NothingMovesApartInARigidMotion) {
     const Waves waves;

@@ -173,6 +173,26 @@ TEST(VerificationCrackTip, LayersAreInTheStandardError) {
     }
 }
 
+// Where stiff layers hold the faces together a good way behind the tip, a crack opens as two do whose tips lie apart (fields add
+// up). No ring about the tip is described by the series, and the tip that it finds lies behind: as far as it says.
+TEST(VerificationCrackTip, HeldFacesAreInTheStandardError) {
+    VirtualCameraOptions options;
+    options.columns = 480;
+    options.rows = 400;
+    VirtualTest test(options);
+    constexpr double held = 80, opening = 4, share = 0.2;  // of the faces, at 100 px [px], and of that what begins at the tip
+    const Vec2 truth(230.3, 199.6);
+    const PlaneDisplacement ahead = crack_field(truth, 0, share * opening, 0),
+                            behind = crack_field(truth - Vec2(held, 0), 0, (1 - share) * opening, 0);
+    const CrackTip tip = test.tip([&](const Vec2& place) { return Vec2(ahead(place) + behind(place)); });
+    ASSERT_EQ(tip.status, TipStatus::ok);
+    const double off = tip.tip.x() - truth.x(), longer = tip.length - truth.x() - 0.5;
+    std::printf("held over %.0f px: off by %.2f px, said %.2f px, length off by %.2f px, said %.2f px\n", held, off,
+                tip.tip_sigma, longer, tip.sigma);
+    EXPECT_LT(std::abs(off), 3 * tip.tip_sigma);
+    EXPECT_LT(std::abs(longer), 3 * tip.sigma);
+}
+
 // A dark line whose sides lie still is no crack.
 TEST(VerificationCrackTip, NoneAtAShadow) {
     VirtualCameraOptions options;

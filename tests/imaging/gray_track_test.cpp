@@ -152,7 +152,11 @@ TEST(VerificationGrayTrack, NoneWhereThereIsNoCrack) {
 TEST(VerificationGrayTrack, AnotherPictureIsNotLinedUp) {
     const WoodCamera camera(end_grain_picture(columns, rows, 60, {-2000, 200}, 3), 10),
         other(end_grain_picture(columns, rows, 37, {100, -900}, 4), 10);
-    EXPECT_NE(GrayTracker(camera.take({}), {}).tip(other.take({})).status, TipStatus::ok);
+    const GrayTracker tracker(camera.take({}), {});
+    EXPECT_NE(tracker.tip(other.take({})).status, TipStatus::ok);
+    FinePicture black = camera.take({});  // a frame that the camera dropped
+    std::ranges::fill(black.gray, 0.0f);
+    EXPECT_EQ(tracker.tip(black).status, TipStatus::not_lined_up);
 }
 
 // Openings with noise, their start known.

@@ -89,18 +89,31 @@ TEST(UnitGridShare, WidensIntervalsToEitherSideAndTheCovariance) {
     EXPECT_NEAR(fit.parameters[1].standard_error, std::sqrt(9 + e * e / 3), 1e-9);
     EXPECT_NEAR(fit.correlation(0, 1), fit.covariance(0, 1) / std::sqrt(fit.covariance(0, 0) * fit.covariance(1, 1)), 1e-12);
     EXPECT_NE(fit.message.find("the grid leaves"), std::string::npos);
-    // By more than a tenth of a value: no slope tells that, and a tenth to either side is the least. d/3 for each as above.
+    // By more than a tenth of a value: no slope tells that, and a tenth to either side is the least. At twice a tenth so it is
+    // for all, d/3 for each as above and none together; as that is passed nothing jumps.
     const Fit before = fit;
-    take_in_grid(fit, box, x, Eigen::Vector2d(0.01, -0.06));
-    for (int j = 0; j < 2; ++j) {
-        const double tenth = 0.1 * box.value(j, x[j]), share = tenth / box.slope(j, x[j]);
-        const FittedParameter &was = before.parameters[j], &is = fit.parameters[j];
-        EXPECT_NEAR(is.lower_95, box.value(j, box.share(j, was.lower_95) - share), 1e-9);
-        EXPECT_NEAR(is.upper_95, box.value(j, box.share(j, was.upper_95) + share), 1e-9);
-        EXPECT_NEAR(fit.covariance(j, j), before.covariance(j, j) + tenth * tenth / 3, 1e-9);
+    const auto share_of_tenth = [&](int j) { return 0.1 * box.value(j, x[j]) / box.slope(j, x[j]); };
+    const auto off_by = [&](double tenths) { return box.share(1, (1.0 - 0.1 * tenths) * box.value(1, x[1])) - x[1]; };
+    double last = 0.01;
+    for (const double tenths : {0.999, 1.001, 1.5, 1.999, 2.001, 5.0}) {
+        fit = before;
+        take_in_grid(fit, box, x, Eigen::Vector2d(0.01, off_by(tenths)));
+        const double trust = std::clamp(2.0 - tenths, 0.0, 1.0);
+        const double shares[2] = {std::lerp(share_of_tenth(0), 0.01, trust),
+                                  std::lerp(share_of_tenth(1), std::min(-off_by(tenths), share_of_tenth(1)), trust)};
+        for (int j = 0; j < 2; ++j) {
+            const FittedParameter &was = before.parameters[j], &is = fit.parameters[j];
+            EXPECT_NEAR(is.lower_95, box.value(j, box.share(j, was.lower_95) - shares[j]), 1e-9);
+            EXPECT_NEAR(is.upper_95, box.value(j, box.share(j, was.upper_95) + shares[j]), 1e-9);
+            const double own = shares[j] * box.slope(j, x[j]);
+            EXPECT_NEAR(fit.covariance(j, j), before.covariance(j, j) + own * own / 3, 1e-9);
+        }
+        const double both = -trust * shares[0] * box.slope(0, x[0]) * shares[1] * box.slope(1, x[1]) / 3;
+        EXPECT_NEAR(fit.covariance(0, 1), before.covariance(0, 1) + both, 1e-9);
+        EXPECT_EQ(fit.message.find("cannot be told") != std::string::npos, tenths > 1.0);
+        EXPECT_GE(shares[0], last);
+        last = shares[0];
     }
-    EXPECT_DOUBLE_EQ(fit.covariance(0, 1), before.covariance(0, 1));
-    EXPECT_NE(fit.message.find("cannot be told"), std::string::npos);
     // Of one that data tell nothing of no shift is asked: the other's interval goes on by its own.
     fit = before;
     fit.parameters[1].lower_95 = box.value(1, 0);
