@@ -154,7 +154,9 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
     SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
     found.converged = heed_data(weigh_and_descend(found.converged, enough > 0), [this] { return descend_again(); });
     const bool is_fine = widening_ == 1.0;
-    if (is_fine) {
+    // Where a search on wide cells has gone before, each such look takes as long as all steps together.
+    const bool is_cheap = is_fine && (only_toughness_ || starts > 1);
+    if (is_cheap) {
         const auto look = [this] {
             for (int step = 0; step < most_steps_beside && step_beside(objective_, nearby_, more_likely, options_.seed); ++step) {
             }
@@ -177,7 +179,7 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
             found.converged = found.converged && close_in(objective_, nearby_, options_.seed) && weigh_and_descend(true, false);
             found.method += " The last steps took in how the parameters turn the crack, told by runs a little aside.";
         }
-    } else if (is_fine && found.converged) {
+    } else if (is_cheap && found.converged) {
         settle();
     }
     return found;
@@ -293,13 +295,12 @@ bool StudyRuns::know_better(bool converged, const std::function<void()>& look, c
     return converged;
 }
 
-// The last steps: by what the model knows there, to the lowest point, however little they gain.
+// The last step: by what the model knows there, to the lowest point, however little it gains.
 void StudyRuns::settle() {
     weigh_anew(0.0);
     const Evaluation& best = *objective_.best()->evaluation;
     const double least = least_step * std::max(1.0, best.misfit / static_cast<double>(best.residuals.size()));
-    for (int step = 0; step < most_steps_beside && step_beside(objective_, nearby_, least, options_.seed); ++step) {
-    }
+    step_beside(objective_, nearby_, least, options_.seed);
 }
 
 // Whether more than noise is left, or hardly any: then the data may hold what another way would explain.
