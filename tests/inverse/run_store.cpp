@@ -211,6 +211,21 @@ TEST(SystemResume, ATornLastEntryCostsOneRun) {
     expect_same_bits(fit_study(study, options), whole);
 }
 
+// Who forgets --resume has not lost what was kept.
+TEST(UnitResume, WithoutItKeptRunsStayBeside) {
+    const TemporaryFolder folder;
+    const Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
+    FitOptions options = with(FakeWedge{});
+    options.keeping = {folder / "fit.runs", false};
+    fit_study(study, options);
+    EXPECT_FALSE(std::filesystem::exists(folder / "fit.runs~"));
+    const std::string kept_before = folder.read("fit.runs");
+    options.forward = [](const Scene&, const std::atomic<bool>*) -> Record { throw std::runtime_error("lost"); };
+    fit_study(study, options);
+    EXPECT_EQ(folder.read("fit.runs~"), kept_before);
+    EXPECT_NE(folder.read("fit.runs"), kept_before);
+}
+
 TEST(UnitResume, RunsOfAnotherStudyAndOtherFilesAreRefused) {
     const TemporaryFolder folder;
     Study study = wedge_study(FakeWedge{}, 0.02, 1e-4);
