@@ -398,7 +398,11 @@ bool is_lower(const Run& one, const Run& other, const Uncertainty& about) { retu
 std::optional<CloseLook> look_and_descend(Objective& objective, const std::function<std::optional<CloseLook>()>& look,
                                           const std::function<void()>& descend) {
     std::optional<CloseLook> close = look();
-    for (int i = 0; i < most_descents && close && is_lower(close->uncertainty.best, *objective.best(), close->uncertainty); ++i) {
+    const auto is_lower_elsewhere = [&] {  // not at the best run itself, which equilibria known since let seem lower
+        const Run &there = close->uncertainty.best, &best = *objective.best();
+        return is_lower(there, best, close->uncertainty) && (there.x - best.x).cwiseAbs().maxCoeff() > rounding;
+    };
+    for (int i = 0; i < most_descents && close && is_lower_elsewhere(); ++i) {
         const Run before = *objective.best();
         objective.at(close->uncertainty.best.x);
         if (!is_lower(*objective.best(), before, close->uncertainty) ||

@@ -217,7 +217,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
     objective.set_budget_left(study.optimizer.max_runs - reserve);
     const auto stage = [&](const std::string& name) { reporter.set_stage(name); };
     WideSearch before(study, options, store, [&] { reporter.look(); });
-    const bool has_begun = by_walks && before.descend(stage);
+    const bool has_begun = by_walks && before.find_start(stage);
     SearchResult found = has_begun  ? runs.descend(1, before.best(), stage)
                          : by_walks ? runs.descend(stage)
                                     : runs.search(box.initial(), stage);
@@ -328,7 +328,7 @@ Fit fit_study(const Study& study, const FitOptions& options) {
                             100 * model.resolution());
         }
     }
-    if (options.tell_wide_deviance && by_walks && !objective.stopped() && (has_begun || before.descend(stage, true))) {
+    if (options.tell_wide_deviance && by_walks && !objective.stopped() && before.descend(stage)) {
         options.tell_wide_deviance(before.deviance());
     }
     fill_runs(fit, box, objective.runs());

@@ -142,17 +142,27 @@ Evaluation StudyRuns::run(const Eigen::VectorXd& x, int share) {
     return evaluation;
 }
 
+// The misfit that noise leaves; 0 where ways differ.
+double StudyRuns::left_by_noise() const {
+    const MeasuredCurves curves = model_.curves();
+    double left = 0;
+    for (std::size_t i = 0; i < curves.lengths.size() && !nearby_.ways_differ; ++i) {
+        left += std::pow(curves.root(i), 2) * curves.lengths[i];
+    }
+    return left;
+}
+
+// Weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
+SearchResult StudyRuns::descend_at_worst(int starts, const Eigen::VectorXd& initial,
+                                         const std::function<void(const std::string&)>& stage) {
+    const auto is_enough = [enough = left_by_noise()](const Evaluation& best) { return best.misfit < enough; };
+    return descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
+}
+
 SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
                                 const std::function<void(const std::string&)>& stage) {
-    // The first descent is weighed by what the model knows at worst: where that explains the misfit it is for others to go on.
-    const MeasuredCurves curves = model_.curves();
-    double enough = 0;
-    for (std::size_t i = 0; i < curves.lengths.size() && !nearby_.ways_differ; ++i) {
-        enough += std::pow(curves.root(i), 2) * curves.lengths[i];
-    }
-    const auto is_enough = [enough](const Evaluation& best) { return best.misfit < enough; };
-    SearchResult found = descend_by_walks(objective_, nearby_, starts, is_enough, initial, options_.seed, stage);
-    found.converged = heed_data(weigh_and_descend(found.converged, enough > 0), [this] { return descend_again(); });
+    SearchResult found = descend_at_worst(starts, initial, stage);
+    found.converged = heed_data(weigh_and_descend(found.converged, left_by_noise() > 0), [this] { return descend_again(); });
     const bool is_fine = widening_ == 1.0;
     // Where a search on wide cells has gone before, each such look takes as long as all steps together.
     const bool is_cheap = is_fine && (only_toughness_ || starts > 1);
@@ -186,8 +196,14 @@ SearchResult StudyRuns::descend(int starts, const Eigen::VectorXd& initial,
 }
 
 SearchResult StudyRuns::descend(const std::function<void(const std::string&)>& stage) {
-    return descend(std::max(study_.optimizer.starts, least_starts_where_unexplained), model_.box().initial(), stage);
+    return descend(all_starts(), model_.box().initial(), stage);
 }
+
+SearchResult StudyRuns::find_start(const std::function<void(const std::string&)>& stage) {
+    return nearby_.turning.empty() ? descend_at_worst(all_starts(), model_.box().initial(), stage) : descend(stage);
+}
+
+int StudyRuns::all_starts() const { return std::max(study_.optimizer.starts, least_starts_where_unexplained); }
 
 bool StudyRuns::descend_again() { return weigh_and_descend(descend_as_weighed(false), false); }
 

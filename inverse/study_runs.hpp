@@ -33,6 +33,9 @@ class StudyRuns {
     SearchResult descend(int starts, const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
     /// The same from the study's initial values, and from others where these do not explain the data.
     SearchResult descend(const std::function<void(const std::string&)>& stage);
+    /// The same as far as a search that goes on from there needs it: what the model knows at worst explains the data, or the way
+    /// that the crack goes is the best one.
+    SearchResult find_start(const std::function<void(const std::string&)>& stage);
 
     /// By the study's method, from `initial`. Where runs go from equilibrium to equilibrium it goes on from the best one, weighed
     /// by what the residuals say of the model's resolution, as `descend` does; else the resolution is what it is at worst.
@@ -54,6 +57,10 @@ class StudyRuns {
 
   private:
     Forward forward() const;
+    int all_starts() const;
+    double left_by_noise() const;
+    SearchResult descend_at_worst(int starts, const Eigen::VectorXd& initial,
+                                  const std::function<void(const std::string&)>& stage);
     Near by_walk_of(Forward (KeptWalks::*runs)(const std::vector<double>&) const);
     Lowest recall(const Eigen::VectorXd& point, const Window& window, bool rough, const std::function<Lowest()>& search);
     bool weigh_anew(double least_change);

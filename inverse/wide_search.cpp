@@ -22,11 +22,8 @@ double cells_of(const Scene& scene) {
 WideSearch::WideSearch(const Study& study, const FitOptions& options, RunStore& store, std::function<void()> look)
     : study_(on_wide_cells(study)), options_(options), store_(store), look_(std::move(look)) {}
 
-bool WideSearch::descend(const std::function<void(const std::string&)>& stage, bool anyway) {
-    const auto is_small = [](const Experiment& experiment) { return 4 * cells_of(experiment.scene) < least_cells; };
-    if (!anyway && std::all_of(study_.experiments.begin(), study_.experiments.end(), is_small)) {
-        return false;
-    }
+// Whether there is a search along walks on those cells.
+bool WideSearch::make_runs() {
     try {
         runs_ = std::make_unique<StudyRuns>(study_, options_, store_, 2.0, [this](const Run&) { look_(); });
     } catch (const InputError&) {  // too wide for something in the scene
@@ -34,6 +31,21 @@ bool WideSearch::descend(const std::function<void(const std::string&)>& stage, b
     }
     if (!runs_->by_walks()) {
         runs_.reset();
+    }
+    return runs_ != nullptr;
+}
+
+bool WideSearch::find_start(const std::function<void(const std::string&)>& stage) {
+    const auto is_small = [](const Experiment& experiment) { return 4 * cells_of(experiment.scene) < least_cells; };
+    if (std::all_of(study_.experiments.begin(), study_.experiments.end(), is_small) || !make_runs()) {
+        return false;
+    }
+    runs_->find_start([&](const std::string& name) { stage(name + " on cells twice as wide"); });
+    return runs_->objective().best() != nullptr;
+}
+
+bool WideSearch::descend(const std::function<void(const std::string&)>& stage) {
+    if (!runs_ && !make_runs()) {
         return false;
     }
     runs_->descend([&](const std::string& name) { stage(name + " on cells twice as wide"); });
@@ -56,7 +68,7 @@ std::string WideSearch::method() const {
 
 Evaluation WideSearch::at(const Eigen::VectorXd& x) {
     if (runs_) {
-        runs_->objective().set_budget_left(1);
+        runs_->objective().set_budget_left(std::max(1, runs_->objective().budget_left()));
         const auto run = runs_->objective().at(x);
         return run ? *run : Evaluation{"interrupted", {}, {}};
     }

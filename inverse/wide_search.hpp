@@ -18,9 +18,12 @@ class WideSearch {
     /// All that is given must outlive this. `look` is called after each run.
     WideSearch(const Study& study, const FitOptions& options, RunStore& store, std::function<void()> look);
 
-    /// Searches as `StudyRuns::descend` does, from the study's own starting points. False where that is not worth while, but for
-    /// `anyway`, or where it found nothing.
-    bool descend(const std::function<void(const std::string&)>& stage, bool anyway = false);
+    /// Where a search on the study's own cells begins (`StudyRuns::find_start`). False where that is not worth while, or where
+    /// nothing was found.
+    bool find_start(const std::function<void(const std::string&)>& stage);
+
+    /// Searches as `StudyRuns::descend` does, from the study's own starting points. False where nothing was found.
+    bool descend(const std::function<void(const std::string&)>& stage);
 
     /// What its best point makes of the data, -2 ln of the likelihood but for a constant; not a number where nothing was
     /// searched.
@@ -36,6 +39,8 @@ class WideSearch {
     Evaluation at(const Eigen::VectorXd& x);
 
   private:
+    bool make_runs();
+
     const Study study_;
     const FitOptions& options_;
     RunStore& store_;

@@ -488,5 +488,34 @@ TEST(UnitCloseLook, TakesInTheBestRunWhereTheCheapModelPromisesAnother) {
     EXPECT_NEAR(u.upper_95[0], promised[0] + u.quantile * 0.02, 0.005);
 }
 
+// Equilibria that are known since let the cheap model be lower than the best run at its own place: there is nothing to run,
+// wherever rounding puts that place.
+TEST(UnitCloseLook, RunsNothingWhereTheCheapModelIsLowerAtTheBestRunItself) {
+    for (int place = 0; place < 20; ++place) {
+        const Vector2d best(0.3 + 0.013 * place, 0.7 - 0.017 * place);
+        const auto bowl = [best](double floor) {
+            return [best, floor](const VectorXd& x, int) {
+                Evaluation evaluation = two_valleys(x);
+                const Vector2d off = x - best;
+                evaluation.residuals.head(3) << (off[0] + 2 * off[1]) / 0.02, (2 * off[0] - 3 * off[1]) / 0.07, floor;
+                evaluation.misfit = evaluation.residuals.squaredNorm();
+                return evaluation;
+            };
+        };
+        Objective objective(2, bowl(1.0), 100, 1);
+        objective.at(best);
+        const auto found = look_and_descend(
+            objective,
+            [&] {
+                return look_close(objective, {bowl(0.5), true, 1}, best, {{30}}, {"a", "b"}, 1);
+            },
+            [] { FAIL() << "it is the same point"; });
+        ASSERT_TRUE(found) << place;
+        EXPECT_LT(found->uncertainty.best.evaluation->misfit, objective.best()->evaluation->misfit - 0.5) << place;
+        EXPECT_LT((found->uncertainty.best.x - best).cwiseAbs().maxCoeff(), 1e-9) << place;
+        EXPECT_EQ(objective.runs().size(), 1u) << place;
+    }
+}
+
 }  // namespace
 }  // namespace crampfit
