@@ -569,10 +569,11 @@ TipLoad tip_load(const Discretisation& body, const CrackFields& cracks, const Ma
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 K = intensity_factors(body, cracks, line, at_end, field, anywhere, state, pieces, options.rotates);
     // Faces that press on each other behind the tip leave no mode I. Near mode II the grid lets those of the tip's own cell press
-    // where the crack is open.
-    const bool press = std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
-        return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
-    });
+    // where the crack is open, and B-splines farther off: where mode I prevails it is open.
+    const bool press =
+        K[0] <= std::abs(K[1]) && std::any_of(pieces.begin(), pieces.end(), [&](const FacePiece& piece) {
+            return piece.near < 2.0 * h && piece.far > 1.5 * h && piece.force.dot(turn * left_of(tip.direction)) > 0.0;
+        });
     const Vec2 seen(press ? 0.0 : std::max(0.0, K[0]), K[1]);
     load.K_I = seen[0];
     load.K_II = seen[1];

@@ -13,6 +13,7 @@
 #include "forward/tip_ties.hpp"
 #include "forward/velocity_mapping.hpp"
 
+#include <deque>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -74,7 +75,7 @@ class ExplicitSolver {
     struct Tip {
         double allowed = std::numeric_limits<double>::infinity();      // how far a Rayleigh wave leaves it to go at once [m]
         double since_turn = std::numeric_limits<double>::infinity();   // how far it has gone in its direction [m]
-        double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since `noted_at` [m]
+        double since_noted = std::numeric_limits<double>::infinity();  // how far it has gone since the last `noted_at` [m]
         double owed = 0;                                               // energy that turns have given it [J]
         Vec2 opening = Vec2::Zero();                                   // behind it, a mean over a short time [m]
         std::unique_ptr<TipPatch> patch;                               // as of some time ago
@@ -82,7 +83,7 @@ class ExplicitSolver {
         double finer_at = 0;                                           // part of what it must that it gave up, by the patch, when
                                                                        // finer cells were asked last
         Vec2 patch_direction = Vec2::Zero();                           // then
-        double noted_at = 0;                                           // [s]
+        std::deque<double> noted_at;                                   // of the last cells that it has gone through [s]
     };
     void place_bodies();
     void start_parts();

@@ -19,7 +19,7 @@ constexpr double cells_in_mean = 4.0;
 
 // How far a tip may be ahead of a Rayleigh wave. A tip that is held back takes up more than the toughness asks for.
 constexpr double most_ahead_in_cells = 1.0;
-constexpr double cells_in_speed = 8.0;  // over which it is told
+constexpr std::size_t cells_in_speed = 8;  // over which it is told
 
 // A patch about a tip is good while the tip keeps its direction by 10 degrees.
 constexpr double most_turn_cosine = 0.985;
@@ -185,11 +185,15 @@ FineTip::Ahead ExplicitSolver::finer_ahead(int crack, bool at_end, const TipPatc
 }
 
 void ExplicitSolver::note_speed(Tip& state, double way) {
+    const double cell = body_.layout.cell.minCoeff();
     state.since_noted += way;
-    if (state.since_noted < cells_in_speed * body_.layout.cell.minCoeff()) return;
-    if (std::isfinite(state.since_noted)) fastest_crack_ = std::max(fastest_crack_, state.since_noted / (time_ - state.noted_at));
-    state.since_noted = 0.0;
-    state.noted_at = time_;
+    while (state.since_noted >= cell) {
+        state.since_noted = std::isfinite(state.since_noted) ? state.since_noted - cell : 0.0;
+        state.noted_at.push_back(time_);
+        if (state.noted_at.size() <= cells_in_speed) continue;
+        fastest_crack_ = std::max(fastest_crack_, cells_in_speed * cell / (time_ - state.noted_at.front()));
+        state.noted_at.pop_front();
+    }
 }
 
 }  // namespace crampfit

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 namespace crampfit {
@@ -13,6 +14,11 @@ namespace {
 
 constexpr double stretch = 2.0;  // a of Goodman and Weare
 constexpr double impossible = -std::numeric_limits<double>::infinity();
+// A walker does not begin where it is less likely than the best one by more, in ln of the likelihood, than one in ten million is
+// for each parameter that is told (normal): from there hardly any stretch leads back. So many halvings of its way from the
+// centre.
+constexpr double far_below = 15.0;
+constexpr int most_halvings = 20;
 
 struct Walker {
     Run run;
@@ -33,12 +39,30 @@ class Sampler {
         for (int k = 0; k < walkers; ++k) {
             points.push_back(point_about(centre, root));
         }
-        const auto evaluations = objective_.at(points);
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            if (!evaluations[k]) {
-                return false;
+        std::vector<std::size_t> away(points.size());  // walkers that have no place yet
+        std::iota(away.begin(), away.end(), 0);
+        walkers_.resize(points.size());
+        for (int halving = 0; halving <= most_halvings && !away.empty(); ++halving) {
+            std::vector<Eigen::VectorXd> tried;
+            for (const std::size_t k : away) {
+                tried.push_back(points[k]);
             }
-            walkers_.push_back({{points[k], evaluations[k]}, log_likelihood_of(*evaluations[k])});
+            const auto evaluations = objective_.at(tried);
+            for (std::size_t i = 0; i < away.size(); ++i) {
+                if (!evaluations[i]) {
+                    return false;
+                }
+                walkers_[away[i]] = {{tried[i], evaluations[i]}, log_likelihood_of(*evaluations[i])};
+            }
+            const double best = std::ranges::max(walkers_, {}, &Walker::log_likelihood).log_likelihood;
+            const double least = best - far_below * static_cast<double>(centre.size());
+            away.clear();
+            for (std::size_t k = 0; k < points.size(); ++k) {
+                if (walkers_[k].log_likelihood < least) {
+                    away.push_back(k);
+                    points[k] = 0.5 * (points[k] + centre);
+                }
+            }
         }
         return true;
     }

@@ -20,7 +20,8 @@ struct Ensemble {
 /// Draws from exp(log_likelihood) over the unit cube with the affine-invariant ensemble of Goodman and Weare (2010),
 /// Communications in Applied Mathematics and Computational Science 5, stretch move with a = 2; both halves of the walkers in
 /// turn, as in Foreman-Mackey et al. (2013), so that each half's runs are made side by side. The walkers begin about `centre`
-/// with this covariance; a third of the sweeps, fifty at least, are left out at the begin. A failed run has no likelihood.
+/// with this covariance, nearer to it where that is hardly likely at all; a third of the sweeps, fifty at least, are left out at
+/// the begin. A failed run has no likelihood.
 Ensemble draw_ensemble(Objective& objective, const std::function<double(const Evaluation&)>& log_likelihood,
                        const Eigen::VectorXd& centre, const Eigen::MatrixXd& covariance, int samples, unsigned seed);
 

@@ -17,17 +17,21 @@
 #include "inverse/pool.hpp"
 #include "inverse/sensitivity.hpp"
 
+#include <fmt/format.h>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <cmath>
 #include <exception>
+#include <fstream>
 #include <sstream>
+#include <string_view>
 #include <thread>
 
 namespace py = pybind11;
@@ -37,21 +41,51 @@ namespace {
 
 using Path = std::filesystem::path;
 
+/// A value as TOML has it. A text of its own is one already, as --set takes it: "50 MPa", "[1, 2]"; one within a list or a dict
+/// is a string.
+std::string toml_text(const py::handle& value, bool within = false) {
+    if (py::isinstance<py::bool_>(value)) {
+        return value.cast<bool>() ? "true" : "false";
+    }
+    if (py::isinstance<py::str>(value)) {
+        return within ? py::module_::import("json").attr("dumps")(value).cast<std::string>() : value.cast<std::string>();
+    }
+    if (py::isinstance<py::dict>(value)) {
+        std::string text;
+        for (const auto& [key, entry] : py::reinterpret_borrow<py::dict>(value)) {
+            text += (text.empty() ? "" : ", ") + toml_text(py::str(key), true) + " = " + toml_text(entry, true);
+        }
+        return "{" + text + "}";
+    }
+    if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+        std::string text;
+        for (const auto& entry : value) {
+            text += (text.empty() ? "" : ", ") + toml_text(entry, true);
+        }
+        return "[" + text + "]";
+    }
+    if (py::hasattr(value, "tolist")) {  // numpy's arrays and numbers
+        return toml_text(value.attr("tolist")(), within);
+    }
+    return py::str(value);
+}
+
 Overrides overrides_of(const py::dict& settings) {
     Overrides overrides;
     for (const auto& [key, value] : settings) {
-        overrides.emplace_back(py::str(key), py::str(value));
+        overrides.emplace_back(py::str(key), toml_text(value));
     }
     return overrides;
 }
 
-/// Runs it on a thread of its own, so that Python hears of Ctrl-C meanwhile, which asks it to stop.
+/// Runs it on a thread of its own, so that Python hears of Ctrl-C meanwhile, which asks it to stop; what a signal's handler
+/// raises, such as KeyboardInterrupt, is raised once it has.
 template <class Work>
 auto interruptible(const Work& work) {
     std::atomic<bool> stop{false}, done{false};
     std::optional<decltype(work(&stop))> result;
     std::exception_ptr thrown;
-    bool interrupted = false;
+    std::optional<py::error_already_set> raised;
     {
         const std::jthread worker([&] {
             try {
@@ -65,11 +99,14 @@ auto interruptible(const Work& work) {
         while (!done) {
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
             const py::gil_scoped_acquire python;
-            if (!interrupted && PyErr_CheckSignals() != 0) {
-                PyErr_Clear();
-                stop = interrupted = true;
+            if (!raised && PyErr_CheckSignals() != 0) {
+                raised.emplace();
+                stop = true;
             }
         }
+    }
+    if (raised) {
+        throw py::error_already_set(*raised);
     }
     if (thrown) {
         std::rethrow_exception(thrown);
@@ -107,7 +144,7 @@ std::optional<double> number(const std::string& text) {
     return error == std::errc() && rest == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
-/// Columns by their names: numbers where all are, else texts.
+/// Columns by their names: numbers or truth values where all are, else texts.
 template <class Result>
 py::dict table(const Result& result, const std::string& name) {
     std::ostringstream csv;
@@ -123,13 +160,33 @@ py::dict table(const Result& result, const std::string& name) {
                 numbers.push_back(*value);
             }
         }
+        const py::object array = py::module_::import("numpy").attr("array");
+        const auto is_truth = [&](const auto& row) { return row[c] == "true" || row[c] == "false"; };
+        py::object column;
         if (numbers.size() + 1 == rows.size()) {
-            columns[py::str(rows[0][c])] = py::array_t<double>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+            column = py::array_t<double>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+        } else if (std::all_of(rows.begin() + 1, rows.end(), is_truth)) {
+            column = array(texts).attr("__eq__")("true");
         } else {
-            columns[py::str(rows[0][c])] = py::module_::import("numpy").attr("array")(texts);
+            column = array(texts);
         }
+        columns[py::str(rows[0][c])] = column;
     }
     return columns;
+}
+
+/// Writes a result as HDF5, over no file of another kind, such as the scene that it came from.
+template <class Result>
+void save(const Result& result, const Path& file) {
+    constexpr std::string_view signature = "\x89HDF\r\n\x1a\n";  // of HDF5
+    if (std::ifstream before(file, std::ios::binary); before) {
+        std::string begin(signature.size(), '\0');
+        before.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+        if (before.gcount() > 0 && begin != signature) {
+            throw InputError(file.string(), "", "", "is a file of another kind, which HDF5 is not to replace");
+        }
+    }
+    write(result, file);
 }
 
 template <class Result>
@@ -137,11 +194,14 @@ void bind_tables(py::class_<Result>& type) {
     type.def_property_readonly(
         "tables", [](const Result& result) { return table_names(result); }, "names of its tables");
     type.def("table", &table<Result>, py::arg("name"), "one of its tables: a dict of columns, as `crampfit csv` prints them");
-    type.def(
-        "save", [](const Result& result, const Path& file) { write(result, file); }, py::arg("file"), "writes it as HDF5");
-    type.def_property_readonly("status", [](const Result& result) { return std::string(name(result.status)); });
+    type.def("save", &save<Result>, py::arg("file"), "writes it as HDF5");
+    type.def_property_readonly(
+        "status", [](const Result& result) { return std::string(name(result.status)); }, "how it ended, a word");
     type.def_readonly("message", &Result::message, "why it ended, for a person");
-    type.def_readonly("seconds", &Result::seconds);
+    type.def_readonly("seconds", &Result::seconds, "that it took");
+    type.def("__repr__", [type = py::str(type.attr("__name__")).cast<std::string>()](const Result& result) {
+        return "<crampfit." + type + ": " + std::string(name(result.status)) + ">";
+    });
 }
 
 template <class Vector>
@@ -185,10 +245,11 @@ Study open_study(const Path& file, const py::dict& settings) {
     return study;
 }
 
-Record run_scene(const Path& file, const py::dict& settings) {
+Record run_scene(const Path& file, const py::dict& settings, int threads) {
     const Scene scene = open_scene(file, settings);
     return interruptible([&](const std::atomic<bool>* stop) {
         SimulateOptions options;
+        options.threads = thread_count(threads);
         options.stop_requested = stop;
         return simulate(scene, options);
     });
@@ -200,6 +261,8 @@ Options options_of(int threads, const std::optional<Path>& keep, bool resume) {
     options.threads = threads;
     if (keep) {
         options.keeping = {*keep, resume};
+    } else if (resume) {
+        throw InputError("arguments", "resume", "True", "needs `keep`, the file of the runs to go on from");
     }
     return options;
 }
@@ -231,7 +294,14 @@ Eigen::VectorXd values_of(const Study& study, const std::map<std::string, double
     for (std::size_t j = 0; j < study.parameters.size(); ++j) {
         const Parameter& parameter = study.parameters[j];
         const auto found = given.find(parameter.name);
-        values[static_cast<Eigen::Index>(j)] = found != given.end() ? found->second * parameter.unit_factor : parameter.initial;
+        double& value = values[static_cast<Eigen::Index>(j)];
+        value = found != given.end() ? found->second * parameter.unit_factor : parameter.initial;
+        if (!(value >= parameter.lower && value <= parameter.upper)) {
+            throw InputError("values", parameter.name, fmt::format("{:g} {}", found->second, parameter.unit),
+                             fmt::format("must lie within the study's bounds, {:g} to {:g} {}",
+                                         parameter.lower / parameter.unit_factor, parameter.upper / parameter.unit_factor,
+                                         parameter.unit));
+        }
     }
     for (const auto& [name, value] : given) {
         const bool known =
@@ -288,15 +358,17 @@ void bind_results(py::module_& module) {
     bind_tables(record);
     record.def_property_readonly(
         "points", [](const Record& r) { return matrix(r.point_position); }, "undeformed places [points x 2], m");
-    record.def_property_readonly("frames", &frames, "the points at some instants, where the scene asks for frames");
+    record.def_property_readonly("frames", &frames,
+                                 "the points at some instants, where the scene asks for frames: dicts of time_s, displacement_m, "
+                                 "moved_m [points x 2], stress_Pa [points x 4] (xx, yy, xy, zz) and crack_m [corners x 2]");
 
     py::class_<Fit> fit(module, "Fit", "What a fit gives.");
     bind_tables(fit);
-    fit.def_readonly("method", &Fit::method);
+    fit.def_readonly("method", &Fit::method, "how the search went, for a person");
     fit.def_readonly("misfit", &Fit::misfit, "sum of squared weighted residuals");
-    fit.def_readonly("reduced_chi_square", &Fit::reduced_chi_square);
-    fit.def_readonly("covariance", &Fit::covariance, "in the parameters' units");
-    fit.def_readonly("correlation", &Fit::correlation);
+    fit.def_readonly("reduced_chi_square", &Fit::reduced_chi_square, "of the data, over their degrees of freedom");
+    fit.def_readonly("covariance", &Fit::covariance, "[parameters x parameters], in their units");
+    fit.def_readonly("correlation", &Fit::correlation, "of the parameters, [parameters x parameters]");
 
     py::class_<Sensitivity> sensitivity(module, "Sensitivity", "What a sensitivity study gives.");
     bind_tables(sensitivity);
@@ -309,20 +381,22 @@ PYBIND11_MODULE(crampfit, module) {
     using namespace crampfit;
     module.doc() = "Couples crack-growth simulations of wood to experiments; functions are named as the command's verbs.";
     module.attr("__version__") = CRAMPFIT_VERSION;
-    py::register_exception<InputError>(module, "InputError", PyExc_ValueError);
+    py::register_exception<InputError>(module, "InputError", PyExc_ValueError).doc() =
+        "Bad input: file, key, value and the rule that it breaks.";
     bind_results(module);
     const py::arg_v set("set", py::dict(), "{}");
     const py::arg_v threads("threads", 0, "0");
     const py::arg_v keep("keep", py::none(), "None");
     const py::arg_v resume("resume", false, "False");
-    module.def("simulate", &run_scene, py::arg("scene"), set, "Runs a scene. `set` overrides keys, as --set does.");
+    module.def("simulate", &run_scene, py::arg("scene"), set, threads,
+               "Runs a scene. `set` overrides keys, as --set does: texts such as \"50 MPa\", or numbers, truth values, lists and "
+               "dicts. `threads`: 0 for one a core.");
     module.def(
         "explain", [](const Path& scene, const py::dict& settings) { return explain(open_scene(scene, settings)); },
         py::arg("scene"), set, "What will be modelled, by which solver, why, and what it will cost.");
     module.def("fit", &run_fit, py::arg("study"), set, threads, keep, resume,
                "Adjusts parameters until the simulations match the experiments. `keep`: a file for the runs as they end; "
-               "`resume`: go on "
-               "from those that are there. Ctrl-C ends it with what it has.");
+               "`resume`: go on from those that are there.");
     module.def("sensitivity", &run_sensitivity, py::arg("study"), set, threads, keep, resume,
                "Local, Morris and Sobol sensitivity of the chosen outputs.");
     module.def("evaluate", &run_evaluation, py::arg("study"), py::arg("values") = std::map<std::string, double>(), set, threads,

@@ -104,6 +104,30 @@ TEST(VerificationPosterior, KeepsToTheCubeAndCutsADistributionOffThere) {
     EXPECT_NEAR(mean, exact, 4 * 0.06 / std::sqrt(20000 / ensemble.correlation_time.maxCoeff()));
 }
 
+// Jumps of the curves leave a ring about the best point that is worse the nearer to it: a walker that begins beyond stays there.
+TEST(VerificationPosterior, NoWalkerBeginsWhereNothingLeadsBack) {
+    constexpr double sd = 0.01;
+    const Eigen::Vector2d centre(0.5, 0.5);
+    Objective objective(
+        2,
+        [&](const Eigen::VectorXd& x, int) {
+            const double off = (x - centre).norm();
+            Evaluation evaluation;
+            evaluation.residuals = off < 5 * sd ? Eigen::Vector2d((x - centre) / sd) : Eigen::Vector2d(100 * (1 - off), 0);
+            evaluation.misfit = evaluation.residuals.squaredNorm();
+            return evaluation;
+        },
+        100000, 1);
+    const Ensemble ensemble = draw_ensemble(objective, half_misfit, centre, Eigen::Matrix2d::Identity() * 0.01, 8000, 5);
+    double highest = 0, squares = 0;
+    for (const crampfit::Run& sample : ensemble.samples) {
+        highest = std::max(highest, sample.evaluation->misfit);
+        squares += (sample.x - centre).squaredNorm() / (2 * 8000);
+    }
+    EXPECT_LT(highest, 25);  // the ring
+    EXPECT_NEAR(std::sqrt(squares), sd, 4 * sd / std::sqrt(4 * 8000 / ensemble.correlation_time.maxCoeff()));
+}
+
 // In a linear problem the profile is a parabola, and its interval that of the covariance.
 TEST(VerificationProfile, IntervalsOfALinearProblemAreExact) {
     const Normal normal;

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The Python module against the closed forms that the command's tests use, and against the files it writes."""
 import os
+import signal
 import tempfile
 import unittest
 
@@ -111,6 +112,7 @@ class Module(unittest.TestCase):
         self.assertEqual(fit.status, "converged", fit.message)
         np.testing.assert_allclose(fit.table("parameters")["value"], [100, 60], rtol=1e-6)
         self.assertEqual(fit.covariance.shape, (2, 2))
+        self.assertFalse(fit.table("parameters")["at_bound"].any())
         fit.save(self.path("fit.h5"))
         self.assertEqual(crampfit.load(self.path("fit.h5")).misfit, fit.misfit)
 
@@ -122,6 +124,41 @@ class Module(unittest.TestCase):
         study = self.write("study.toml", 'scene = "scene.toml"\noutputs = ["peak force"]\n' + PARAMETERS)
         with self.assertRaisesRegex(crampfit.InputError, "no parameter of the study"):
             crampfit.evaluate(study, {"modulos": 1.0})
+        for outside in (-5.0, 500.0, float("nan")):
+            with self.assertRaisesRegex(crampfit.InputError, "modulus.*must lie within the study's bounds, 40 to 80 MPa"):
+                crampfit.evaluate(study, {"modulus": outside})
+        with self.assertRaisesRegex(crampfit.InputError, "needs `keep`"):
+            crampfit.fit(study, resume=True)
+        record = crampfit.simulate(self.path("scene.toml"))
+        with self.assertRaisesRegex(crampfit.InputError, "file of another kind"):
+            record.save(self.path("scene.toml"))
+        with open(self.path("scene.toml"), encoding="utf-8") as scene:
+            self.assertEqual(scene.read(), SCENE)
+        self.assertEqual(repr(record), "<crampfit.Record: split>")
+
+    def test_settings_of_any_type(self):
+        plain = crampfit.simulate(self.path("scene.toml"), set={"model.points_per_cell": "9", "solver.extrapolate": "false"}, threads=2)
+        typed = crampfit.simulate(
+            self.path("scene.toml"),
+            set={
+                "model.points_per_cell": np.int64(9),
+                "solver.extrapolate": np.bool_(False),
+                "specimen.size": ("10 mm", "10 mm"),
+                "cracks.0.faces": {"friction": 0.0},
+            },
+        )
+        np.testing.assert_array_equal(typed.table("series")["force_N"], plain.table("series")["force_N"])
+        self.assertEqual(len(typed.points), 400 * 9)
+
+    def test_what_a_signal_raises(self):
+        def late(number, frame):
+            raise TimeoutError("too late")
+
+        before = signal.signal(signal.SIGALRM, late)
+        self.addCleanup(signal.signal, signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with self.assertRaisesRegex(TimeoutError, "too late"):
+            crampfit.simulate(self.path("scene.toml"), set={"model.cell": "0.05 mm"})
 
 
 if __name__ == "__main__":
