@@ -226,15 +226,25 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
     if (rows.widest_step(from, to) <= close * window) {
         return {{from, to}};
     }
+    // Beside a jump that rows at one place have seen, they are averaged up to it and from it on, over as long at the least as a
+    // row speaks for: a model whose jump is there but for rounding has it so.
+    const double least = 0.5 * together * window;
+    const Intervals places = places_of(rows);
     Intervals groups;
-    for (const auto& [first, last] : places_of(rows)) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        const auto& [first, last] = places[i];
         if (first < from || first > to || (first == to && to < rows.x().back())) {
             continue;  // it belongs to the next tile
         }
+        const bool jumps = i > 0 && i + 1 < places.size() && rows.at(first) != rows.at(last);
         if (!groups.empty() && first - groups.back().second <= together * window) {
-            groups.back().second = last;
+            groups.back().second = jumps ? first : last;
         } else {
-            groups.emplace_back(first, last);
+            groups.emplace_back(jumps ? std::max(first - least, std::midpoint(places[i - 1].second, first)) : first,
+                                jumps ? first : last);
+        }
+        if (jumps) {
+            groups.emplace_back(last, std::min(last + least, std::midpoint(last, places[i + 1].first)));
         }
     }
     return groups;

@@ -323,6 +323,47 @@ TEST(UnitResiduals, FewRowsAreStationsThemselves) {
 }
 
 // What an error of a row does is known by moving it: to a station's sigma and, where rows are few, to one station alone.
+// Ten rows up to a drop that two at one place have seen, and ten from there on.
+TEST(UnitResiduals, TheRowBeforeADropCounts) {
+    constexpr double drop_at = 0.5e-3;
+    const auto falling = [](double at, int rows) {
+        Record record;
+        for (int i = 1; i <= 2 * rows; ++i) {
+            Instant instant;
+            instant.displacement = i <= rows ? at * i / rows : 1e-3 - (1e-3 - at) * (2 * rows - i) / (rows - 1);
+            instant.force = i <= rows ? 1e5 * instant.displacement : 20 - 1e4 * (instant.displacement - at);
+            record.series.push_back(instant);
+        }
+        return record;
+    };
+    Experiment experiment;
+    experiment.name = "test";
+    const Record rows = falling(drop_at, 10);
+    for (const Instant& row : rows.series) {
+        experiment.data.displacement.push_back(row.displacement);
+        experiment.data.force.push_back(row.force);
+    }
+    experiment.noise = {.force = 0.1, .crack_length = {}, .displacement = {}, .time = {}};
+    const Comparison comparison(experiment);
+    const std::vector<FitResidual> force = of_kind(comparison, "force");
+    const auto peak = std::ranges::max_element(force, {}, &FitResidual::measured);
+    EXPECT_NEAR(peak->measured, 50, 0.5);
+    // A drop a hair aside, by the rounding of a table, is the same; one that comes a twentieth sooner is not.
+    const auto misfit = [&](double at) {
+        const Eigen::VectorXd modelled = comparison.modelled(falling(at, 400));
+        double sum = 0;
+        for (std::size_t i = 0; i < force.size(); ++i) {
+            sum += std::pow((modelled[static_cast<Eigen::Index>(i)] - force[i].measured) / force[i].sigma, 2);
+        }
+        return sum;
+    };
+    for (const double hair : {-1e-9, 0.0, 1e-9}) {
+        EXPECT_LT(misfit(drop_at + hair), 0.1) << hair;
+    }
+    EXPECT_GT(misfit(0.95 * drop_at), 1e3);
+    EXPECT_GT(misfit(1.05 * drop_at), 1e3);
+}
+
 TEST(UnitResiduals, ErrorsOfStationsAreThoseOfTheirRows) {
     for (const int rows : {30, 50, 51, 65, 80, 100, 101, 150, 400}) {
         Experiment experiment = straight_experiment();
