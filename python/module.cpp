@@ -48,7 +48,8 @@ std::string toml_text(const py::handle& value, bool within = false) {
         return value.cast<bool>() ? "true" : "false";
     }
     if (py::isinstance<py::str>(value)) {
-        return within ? py::module_::import("json").attr("dumps")(value).cast<std::string>() : value.cast<std::string>();
+        return within ? py::module_::import("json").attr("dumps")(value, py::arg("ensure_ascii") = false).cast<std::string>()
+                      : value.cast<std::string>();
     }
     if (py::isinstance<py::dict>(value)) {
         std::string text;
@@ -296,7 +297,9 @@ Eigen::VectorXd values_of(const Study& study, const std::map<std::string, double
         const auto found = given.find(parameter.name);
         double& value = values[static_cast<Eigen::Index>(j)];
         value = found != given.end() ? found->second * parameter.unit_factor : parameter.initial;
-        if (!(value >= parameter.lower && value <= parameter.upper)) {
+        constexpr double rounding = 1e-12;  // of a bound, in another unit
+        if (!(value >= parameter.lower - rounding * std::abs(parameter.lower) &&
+              value <= parameter.upper + rounding * std::abs(parameter.upper))) {
             throw InputError("values", parameter.name, fmt::format("{:g} {}", found->second, parameter.unit),
                              fmt::format("must lie within the study's bounds, {:g} to {:g} {}",
                                          parameter.lower / parameter.unit_factor, parameter.upper / parameter.unit_factor,

@@ -127,6 +127,7 @@ class Module(unittest.TestCase):
         for outside in (-5.0, 500.0, float("nan")):
             with self.assertRaisesRegex(crampfit.InputError, "modulus.*must lie within the study's bounds, 40 to 80 MPa"):
                 crampfit.evaluate(study, {"modulus": outside})
+        np.testing.assert_array_equal(crampfit.evaluate(study, {"modulus": 80.0}).shape, [1])  # a bound is within
         with self.assertRaisesRegex(crampfit.InputError, "needs `keep`"):
             crampfit.fit(study, resume=True)
         record = crampfit.simulate(self.path("scene.toml"))
@@ -145,6 +146,7 @@ class Module(unittest.TestCase):
                 "solver.extrapolate": np.bool_(False),
                 "specimen.size": ("10 mm", "10 mm"),
                 "cracks.0.faces": {"friction": 0.0},
+                "edges.1": {"name": "Fläche \U0001f332", "side": "bottom", "velocity": ["0 m/s", "0 m/s"]},
             },
         )
         np.testing.assert_array_equal(typed.table("series")["force_N"], plain.table("series")["force_N"])
