@@ -480,7 +480,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                "in the undeformed specimen a point's domain lies in one cell, where linear, GIMP and CPDI weights are the same");
     if (plan.grows && scene.solver.shape_function == ShapeFunction::bspline2)
         plan.choices.push_back({"running cracks", "with B-splines they go up to a third less far than with GIMP, on any grid",
-                                "finite elements with a cohesive line agree with GIMP", true});
+                                "measured, and not understood", true});
     choose("strain", plan.rotates ? "Biot strain, finite rotation" : "small strain",
            chosen ? "asked for in solver.strain"
                   : fmt::format("edges and bodies are expected to move by up to {:.3g} of the specimen's smaller side{}; small "

@@ -322,7 +322,6 @@ TEST(UnitResiduals, FewRowsAreStationsThemselves) {
     EXPECT_DOUBLE_EQ(force[3].sigma, 2.0);
 }
 
-// What an error of a row does is known by moving it: to a station's sigma and, where rows are few, to one station alone.
 // Ten rows up to a drop that two at one place have seen, and ten from there on.
 TEST(UnitResiduals, TheRowBeforeADropCounts) {
     constexpr double drop_at = 0.5e-3;
@@ -364,6 +363,7 @@ TEST(UnitResiduals, TheRowBeforeADropCounts) {
     EXPECT_GT(misfit(1.05 * drop_at), 1e3);
 }
 
+// What an error of a row does is known by moving it: to a station's sigma and, where rows are few, to one station alone.
 TEST(UnitResiduals, ErrorsOfStationsAreThoseOfTheirRows) {
     for (const int rows : {30, 50, 51, 65, 80, 100, 101, 150, 400}) {
         Experiment experiment = straight_experiment();
