@@ -111,6 +111,7 @@ std::string residuals_figure(const Comparison& comparison) {
 std::string comparisons_section(const Fit& fit) {
     std::vector<std::string> drawings;
     for (const Comparison& comparison : comparisons(fit)) {
+        if (comparison.kind == "break") continue;  // a single number: the checks have it
         drawings.push_back(is_field(comparison) ? field_figure(comparison) : comparison_figure(comparison));
         drawings.push_back(residuals_figure(comparison));
     }

@@ -156,6 +156,10 @@ void BridgedFaces::take_in(const CrackFields& cracks, const std::vector<double>&
     }
 }
 
+bool BridgedFaces::holds(const CrackFields& cracks, std::size_t pair) const {
+    return bridges_[pair].area > 0.0 && bridges_[pair].largest < scene_.cracks[cracks.pairs[pair].crack].faces.bridging->opening;
+}
+
 BridgeState BridgedFaces::state(const FieldPair& pair, const Bridge& bridge, double opening) const {
     return bridge_state(*scene_.cracks[pair.crack].faces.bridging, bridge.stiffest / bridge.area,
                         std::max(bridge.largest, opening), opening);

@@ -46,6 +46,9 @@ class BridgedFaces {
     /// Adds the last tractions to what faces put on the left one of each pair [pairs] [N].
     void add_to(std::vector<Vec2>& faces, const FaceNormals& normals) const;
 
+    /// Whether the faces of a pair still pull on each other, or will.
+    bool holds(const CrackFields& cracks, std::size_t pair) const;
+
     struct Energies {
         double stored = 0, dissipated = 0;  // [J]
     };

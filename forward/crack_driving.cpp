@@ -84,10 +84,23 @@ LoadState scaled(const LoadState& state, double factor) {
     return at;
 }
 
+// What forces on their straight way between two states are multiplied by, at a fraction of it, to have done the work by which the
+// potential differs: their power follows the parabola of that mean, or the nearest that does not turn on the way.
+double bend(const LoadState& from, const LoadState& to, double s) {
+    const double straight = std::lerp(from.power, to.power, s);
+    if (straight == 0.0 || from.power * to.power < 0.0) return 1.0;
+    const double rise = std::abs(to.power - from.power);
+    const double lacks = (to.potential - from.potential) / (to.time - from.time) - 0.5 * (from.power + to.power);
+    return 1.0 + std::clamp(6.0 * lacks, -rise, rise) * s * (1.0 - s) / straight;
+}
+
 LoadState between(const LoadState& from, const LoadState& to, double time) {
     const double span = to.time - from.time;
     const double s = (time - from.time) / span;
     LoadState found = weighted({&from, &to}, {1.0 - s, s});
+    const double bent = bend(from, to, s);
+    found.power *= bent;
+    for (Vec2& r : found.reactions) r *= bent;
     found.potential = cubic(from.potential, span * from.power, to.potential, span * to.power, s);
     found.end_potential = cubic(from.end_potential, span * from.end_power, to.end_potential, span * to.end_power, s);
     for (std::size_t k = 0; k < found.tips.size(); ++k) {  // G as K^2

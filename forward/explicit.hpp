@@ -68,6 +68,9 @@ class ExplicitSolver {
     const std::vector<Vec2>& reactions() const { return reaction_; }
     Vec2 moved(int driver) const { return boundary_.moved(driver, time_, displacement_); }
 
+    /// Whether what cracks whose tips have all left it have made of the specimen still does, by its edges, bodies and bridges.
+    bool carries_load() const;
+
     bool is_finite() const;
     bool has_left(int crack, bool at_end) const { return !cracks_.lines[crack].tip(at_end).inside; }
 

@@ -1,6 +1,7 @@
 #include "forward/crack_driving.hpp"
 #include "forward/explicit.hpp"
 #include "forward/growth.hpp"
+#include "forward/loose_pieces.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -124,6 +125,16 @@ double ExplicitSolver::softness_at(int crack, bool at_end, double way) {
     const TipPatch& patch = patch_of(crack, at_end);
     const double since = tips_[2 * crack + at_end].since_patch;
     return patch.softness(patch.gone(ties_.of_tip(cracks_, crack, at_end), since - way) + way, displacement_);
+}
+
+bool ExplicitSolver::carries_load() const {
+    std::vector<Box> pushes;
+    for (const int driver : sliding_driver_) {
+        const Box at = bounds(scene_.bodies[driver - boundary_.first_body()].shape);
+        pushes.push_back({at.low + moved(driver) - body_.layout.cell, at.high + moved(driver) + body_.layout.cell});
+    }
+    return crampfit::carries_load(body_, cracks_, boundary_, mass_, displacement_, pushes,
+                                  [&](std::size_t k) { return bridges_ && bridges_->holds(cracks_, k); });
 }
 
 // How far from there edges or bodies hold the specimen or press on it [m].

@@ -3,14 +3,17 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
+#include <set>
 
 namespace crampfit {
 
 namespace {
 
-// Which piece each field belongs to: the fields that points or ties join, by the first of them.
-std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks, const std::vector<double>& mass) {
+// Which piece each field belongs to: the fields that points join, or what holds a pair, by the first of them.
+std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks,
+                           const std::function<bool(std::size_t)>& joined) {
     std::vector<int> piece(cracks.fields());
     std::iota(piece.begin(), piece.end(), 0);
     const auto first = [&](int field) {
@@ -26,8 +29,8 @@ std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks
         for (int k = 1; k < body.layout.nodes_per_cell(); ++k) join(body.points.node[p][0], body.points.node[p][k]);
     for (const Sliver& sliver : body.slivers)
         for (int k = 1; k < 4; ++k) join(sliver.node[0], sliver.node[k]);
-    for (const FieldPair& pair : cracks.pairs)
-        if (shared_tie(pair, mass) > 0.0) join(pair.left, pair.right);
+    for (std::size_t k = 0; k < cracks.pairs.size(); ++k)
+        if (joined(k)) join(cracks.pairs[k].left, cracks.pairs[k].right);
     for (std::size_t f = 0; f < piece.size(); ++f) piece[f] = first(static_cast<int>(f));
     return piece;
 }
@@ -36,7 +39,8 @@ std::vector<int> pieces_of(const Discretisation& body, const CrackFields& cracks
 
 LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
                               const std::vector<double>& mass, double heaviest) {
-    const std::vector<int> piece = pieces_of(body, cracks, mass);
+    const std::vector<int> piece =
+        pieces_of(body, cracks, [&](std::size_t k) { return shared_tie(cracks.pairs[k], mass) > 0.0; });
     if (std::ranges::none_of(cracks.pairs, [&](const FieldPair& pair) {
             return mass[pair.left] > 0.0 && mass[pair.right] > 0.0 && piece[pair.left] != piece[pair.right];
         }))
@@ -93,6 +97,27 @@ LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cra
         }
     }
     return found;
+}
+
+bool carries_load(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
+                  const std::vector<double>& mass, const std::vector<Vec2>& displacement, const std::vector<Box>& pushes,
+                  const std::function<bool(std::size_t pair)>& joined) {
+    const std::vector<int> piece = pieces_of(body, cracks, joined);
+    std::map<int, std::set<int>> holders;  // drivers by piece
+    const auto take_in = [&](const auto& h) {
+        if (mass[h.field] > 0.0) holders[piece[h.field]].insert(h.driver);
+    };
+    std::ranges::for_each(boundary.held, take_in);
+    std::ranges::for_each(boundary.tied, take_in);
+    if (std::ranges::any_of(holders, [](const auto& of_piece) { return of_piece.second.size() > 1; })) return true;
+    const auto is_held = [&](int field) { return holders.count(piece[field]) > 0; };
+    if (std::ranges::any_of(boundary.tractions, [&](const Boundary::Traction& t) { return is_held(t.field[0]); })) return true;
+    for (std::size_t f = 0; f < piece.size() && !pushes.empty(); ++f) {
+        if (mass[f] == 0.0 || !is_held(static_cast<int>(f))) continue;
+        const Vec2 x = body.layout.node_position(cracks.node_of_field[f]) + displacement[f];
+        if (std::ranges::any_of(pushes, [&](const Box& box) { return box.contains(x); })) return true;
+    }
+    return false;
 }
 
 }  // namespace crampfit

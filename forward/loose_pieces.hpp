@@ -2,6 +2,7 @@
 
 #include "forward/boundary.hpp"
 
+#include <functional>
 #include <limits>
 
 namespace crampfit {
@@ -19,5 +20,12 @@ struct LoosePieces {
 /// alone: they fly off. So are those heavier than `heaviest` [kg].
 LoosePieces find_loose_pieces(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
                               const std::vector<double>& mass, double heaviest = std::numeric_limits<double>::infinity());
+
+/// Whether the specimen can still carry load once cracks have cut it: some piece is held by two edges or bonded bodies, or by one
+/// and something pushes or pulls on it, a traction or, within one of these boxes, a sliding body. Pieces that `joined` pairs of
+/// fields hold together are one.
+bool carries_load(const Discretisation& body, const CrackFields& cracks, const Boundary& boundary,
+                  const std::vector<double>& mass, const std::vector<Vec2>& displacement, const std::vector<Box>& pushes,
+                  const std::function<bool(std::size_t pair)>& joined);
 
 }  // namespace crampfit

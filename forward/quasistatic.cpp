@@ -34,6 +34,9 @@ constexpr double most_stations = 1e9;
 // Into how many steps the loading of a scene that is not linear is divided.
 constexpr int loading_steps = 32;
 
+// The first of them is halved so often: what small loads do must not hang on how far the loading goes.
+constexpr int early_halvings = 3;
+
 // A loading step that does not converge is taken in so many parts at most.
 constexpr int most_parts = 16;
 
@@ -48,8 +51,8 @@ constexpr double most_disagreement = 0.1;
 constexpr double most_rise = 0.005;
 
 // At which equilibria are sought: in so many steps at least, none of which goes over a stop of something that moves. Right behind
-// a stop comes a time of its own, as the power of the load jumps there [s].
-std::vector<double> times_of_loading(const std::vector<double>& stops, double end, int steps) {
+// a stop comes a time of its own, as the power of the load jumps there [s]. The first step is halved `halvings` times.
+std::vector<double> times_of_loading(const std::vector<double>& stops, double end, int steps, int halvings) {
     const double right_behind = 1e-9 * end;
     std::vector<double> times{0.0};
     const auto go_to = [&](double to) {
@@ -63,6 +66,7 @@ std::vector<double> times_of_loading(const std::vector<double>& stops, double en
         times.push_back(stop + right_behind);
     }
     go_to(end);
+    for (int k = 0; k < halvings; ++k) times.insert(times.begin() + 1, 0.5 * times[1]);
     return times;
 }
 
@@ -105,8 +109,8 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     numbers_ = MaterialSlope::of(scene, numbers, body_);
     if (numbers.empty()) equilibrium_.forget_yield_slopes();
     const double end = std::min(plan.end_time, plan.still_from);
-    times_ =
-        times_of_loading(travel_of(scene).stops, std::isfinite(end) && end > 0.0 ? end : 1.0, plan.linear ? 2 : loading_steps);
+    times_ = times_of_loading(travel_of(scene).stops, std::isfinite(end) && end > 0.0 ? end : 1.0,
+                              plan.linear ? 2 : loading_steps, plan.linear ? 0 : early_halvings);
     last_time_ = static_cast<int>(times_.size()) - 1;
     const double cell = body_.layout.cell.minCoeff();
     const int least_stations = plan.linear && growing_tips(scene) == 1 ? least_stations_where_cheap : least_stations_in_advance;

@@ -369,6 +369,8 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
     ExplicitSolver solver(scene, plan, materials, body, std::min(options.threads, 1 + body.points.count() / points_a_thread));
     Recorder recorder(scene, plan, body, solver);
     Standstill standstill(scene, plan);
+    const bool goes_on_left = scene.stop.time || scene.stop.displacement;
+    std::optional<long> left;  // the step by which every growing tip has
     for (long step = 0;; ++step) {
         recorder.look();
         if (!recorder.is_finite()) {
@@ -384,8 +386,9 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
             recorder.finish(RunStatus::finished, "under a constant load nothing goes on: no stop condition can be met");
             break;
         }
-        if (plan.grows && all_growing_tips_left(scene, solver)) {
-            recorder.finish(RunStatus::split, "every growing crack tip has reached a free surface or another crack");
+        if (plan.grows && !left && all_growing_tips_left(scene, solver)) left = step;
+        if (left && (step - *left) % steps_between_reports == 0 && !(goes_on_left && solver.carries_load())) {
+            recorder.finish(RunStatus::split, all_tips_left);
             break;
         }
         if (is_stopped(options)) {
@@ -399,6 +402,7 @@ Record run_explicit(const Scene& scene, const Plan& plan, const MaterialMap& mat
         recorder.add_step();
     }
     Record record = recorder.take();
+    if (left && record.status == RunStatus::finished) record.message.append("; ").append(all_tips_left);
     judge_turns(plan, body, solver.displacements(), record);
     judge_books(record);
     std::vector<Vec2> moved;

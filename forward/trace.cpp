@@ -76,11 +76,14 @@ class Tracer {
 
     Record run() {
         follow();
-        if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
+        if (!walk_.failure().empty() && goes_on_left_) {  // pieces that hold no longer
+            split();
+        } else if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
             record_.status = RunStatus::unstable;
             record_.message =
                 walk_.failure() + (runs_on_ ? ", as the crack runs on at a constant load" : "") + advice_on_holds(scene_);
         }
+        if (goes_on_left_ && record_.status == RunStatus::finished) record_.message.append("; ").append(all_tips_left);
         record_paths();
         if (largest_energy_ > 0.0) record_.worst_energy_imbalance = largest_imbalance_ / largest_energy_;
         if (tracked_.crack >= 0) record_.cracks.erase(record_.cracks.begin() + tracked_.crack);
@@ -145,7 +148,7 @@ class Tracer {
                     jump(i, now, here);
                 }
                 if (done_ || !walk_.failure().empty()) return;
-                if (walk_.station(i).split()) return split();
+                if (walk_.station(i).split() && !goes_on_left_) return split();
                 return end(RunStatus::finished,
                            std::isfinite(end_time())   ? met
                            : std::isfinite(until)      ? "all that moves stands still, and no stop condition can be met any more"
@@ -182,13 +185,14 @@ class Tracer {
                                "the crack runs on at a constant load until nothing holds the specimen together");
                 return end(RunStatus::finished, "the crack's way ends here");
             }
-            const bool parted = carries_nothing(next, now);
+            const bool parted = growing_tips(scene_) > 1 && carries_nothing(next, now);  // a single tip says it itself
             const bool left = walk_.station(next).left || parted;
             if (next > i + 1 || left || critical_[next] <= now) {
                 jump(next, now, here);
                 if (done_) return;
                 if (parted) return end(RunStatus::split, "cracks have parted the specimen: nothing carries load any more");
-                if (left) return split();
+                if (left && (!std::isfinite(end_time()) || carries_nothing(next, now))) return split();
+                goes_on_left_ = left;
             }
             i = next;
         }
@@ -220,12 +224,12 @@ class Tracer {
         return top;
     }
 
-    void split() { end(RunStatus::split, "every growing crack tip has reached a free surface or another crack"); }
+    void split() { end(RunStatus::split, all_tips_left); }
 
     // The load has gone, but for rounding and what Newton's method leaves.
     bool carries_nothing(std::size_t i, double now) {
         constexpr double nothing = 1e-6;
-        if (growing_tips(scene_) < 2 || most_power_ == 0.0) return false;  // a single tip that has gone through says it itself
+        if (most_power_ == 0.0) return false;
         return std::abs(moment(i, now).load.power) <= nothing * most_power_;
     }
 
@@ -459,7 +463,8 @@ class Tracer {
     Record record_;
     Moment last_;
     bool done_ = false;
-    bool runs_on_ = false;  // to where an equilibrium is missing
+    bool runs_on_ = false;       // to where an equilibrium is missing
+    bool goes_on_left_ = false;  // no tip can grow any more, but the specimen carries on
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;

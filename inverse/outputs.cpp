@@ -30,14 +30,25 @@ double peak_force(const Record& record) {
 }
 
 double initial_stiffness(const Record& record) {
-    const double half = 0.5 * peak_force(record);
+    constexpr double begins = 1e-3;  // of the peak
+    constexpr double start = 0.1;    // of the way to the peak: what stiffens or gives way later on must not count
+    const auto size = [](const Instant& row) { return std::abs(row.force); };
+    const Instant& peak = *std::ranges::max_element(record.series, {}, size);
+    const auto first = std::ranges::find_if(record.series, [&](const Instant& row) { return size(row) > begins * size(peak); });
+    const bool swings = std::ranges::any_of(record.series, [](const Instant& row) { return row.kinetic_energy > 0; });
+    const double from = first == record.series.begin() ? first->displacement : std::prev(first)->displacement;
+    const double far = swings ? peak.displacement : std::lerp(from, peak.displacement, start);
+    const double half = 0.5 * size(peak);
     const double first_length = record.series.front().crack_length;
     double n = 0, u = 0, f = 0, uu = 0, uf = 0;
     double low = INFINITY, high = -INFINITY;
     for (const Instant& row : record.series) {
-        const bool beyond = std::abs(row.force) > half || row.crack_length > first_length;
+        const bool beyond = size(row) > half || row.displacement > far || row.crack_length > first_length;
         if (beyond && high > low) {
             break;  // but two places it takes for a slope
+        }
+        if (row.displacement < from) {
+            continue;
         }
         low = std::min(low, row.displacement);
         high = std::max(high, row.displacement);

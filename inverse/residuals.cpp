@@ -25,6 +25,7 @@ constexpr double line_averages = 1.5;
 // In standard deviations of what a curve goes from row to row by noise: a step beyond is a jump, hardly ever noise.
 constexpr double clear = 5.0;
 constexpr double one_place = 1e-3;  // of a window: rows nearer to each other
+constexpr double broken = 0.5;      // of the highest force: what breaks stays below from then on
 
 bool measured(const std::vector<double>& column) {
     return std::any_of(column.begin(), column.end(), [](double value) { return !std::isnan(value); });
@@ -128,9 +129,10 @@ class GrowthByRows {
 
     // What jumps between two places leave open there [m] or [s].
     double error_between(double from, double to) const {
+        const double rounding = 1e-9 * (rows_.x().back() - rows_.x().front());
         double error = 0;
         for (std::size_t i = 0; i < jump_error_.size(); ++i) {
-            if (rows_.x()[i] <= to && rows_.x()[i + 1] >= from) {
+            if (rows_.x()[i] <= to + rounding && rows_.x()[i + 1] >= from - rounding) {
                 error = std::max(error, jump_error_[i]);
             }
         }
@@ -143,6 +145,27 @@ class GrowthByRows {
     double steady_step_ = 0;
     bool ends_with_jump_ = false;
 };
+
+// The last node at which a force is as high as that part of its highest.
+std::size_t last_before_break(std::span<const double> force) {
+    double highest = 0;
+    for (const double f : force) {
+        highest = std::max(highest, std::abs(f));
+    }
+    const auto holds = [&](double f) { return std::abs(f) >= broken * highest; };
+    return static_cast<std::size_t>(force.rend() - std::find_if(force.rbegin(), force.rend(), holds)) - 1;
+}
+
+// Where a force comes down to that part for good; its end where it does not.
+double break_of(std::span<const double> x, std::span<const double> force) {
+    const std::size_t last = last_before_break(force);
+    if (last + 1 == force.size()) {
+        return x[last];
+    }
+    const double highest = std::abs(*std::ranges::max_element(force, {}, [](double f) { return std::abs(f); }));
+    const double before = std::abs(force[last]), after = std::abs(force[last + 1]);
+    return std::lerp(x[last], x[last + 1], (before - broken * highest) / (before - after));
+}
 
 // Of how many rows the nodes on both sides of a place are the mean, at the least.
 double rows_beside(const Curve& rows, double place) {
@@ -236,7 +259,7 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
         if (first < from || first > to || (first == to && to < rows.x().back())) {
             continue;  // it belongs to the next tile
         }
-        const bool jumps = i > 0 && i + 1 < places.size() && rows.at(first) != rows.at(last);
+        const bool jumps = i > 0 && rows.at(first) != rows.at(last);
         if (!groups.empty() && first - groups.back().second <= together * window) {
             groups.back().second = jumps ? first : last;
         } else {
@@ -244,7 +267,8 @@ Intervals averaged_in(const Curve& rows, double from, double to, double window) 
                                 jumps ? first : last);
         }
         if (jumps) {
-            groups.emplace_back(last, std::min(last + least, std::midpoint(last, places[i + 1].first)));
+            groups.emplace_back(last, i + 1 < places.size() ? std::min(last + least, std::midpoint(last, places[i + 1].first))
+                                                            : last + least);
         }
     }
     return groups;
@@ -282,7 +306,7 @@ double Comparison::sigma(std::size_t station, double model_resolution) const {
     }
     const auto& [of_data, half, together] = errors_[station];
     const FitResidual& one = stations_[station];
-    if (one.kind == "arrival") {
+    if (one.kind == "arrival" || one.kind == "break") {
         return std::hypot(of_data[0], model_resolution * one.measured) * std::sqrt(together);
     }
     const bool is_force = one.kind == "force";
@@ -440,6 +464,26 @@ void Comparison::add_force_stations(const Experiment& experiment) {
         stations_.push_back(station);
         errors_.push_back({{noise * averaging, of_sampling, of_place}, half});
     }
+    if (!measured(experiment.data.crack_length)) {  // else arrivals tell of it
+        add_break(experiment, rows, noise, clear * usual);
+    }
+}
+
+// Where one row alone, or few, have seen that the specimen breaks, they say that it has; this says when.
+void Comparison::add_break(const Experiment& experiment, const Curve& rows, double noise, double least_fall) {
+    const std::size_t last = last_before_break(rows.y());
+    if (last + 1 == rows.y().size()) {
+        return;
+    }
+    const double x = rows.x()[last], apart = rows.x()[last + 1] - x, before = std::abs(rows.y()[last]);
+    const bool at_once = before - std::abs(rows.y()[last + 1]) > std::max(least_fall, broken * peak_force_);
+    if (!at_once || apart > smoothing_window * 5 * (rows.x().back() - rows.x().front())) {
+        return;
+    }
+    // It was anywhere between both rows, and the force that it took is known to the noise.
+    const double of_force = noise * rows.error(last) / before * (x - rows.x().front());
+    stations_.push_back({.experiment = experiment.name, .kind = "break", .at = x + 0.5 * apart, .measured = x + 0.5 * apart});
+    errors_.push_back({{std::hypot(apart / std::sqrt(12.0), of_force, abscissa_noise_), 0, 0}});
 }
 
 void Comparison::add_crack_stations(const Experiment& experiment) {
@@ -502,7 +546,8 @@ void Comparison::add_arrival_stations(const Experiment& experiment, const Curve&
         const double of_length = std::max(*arrival - early, late - *arrival) / std::sqrt(line_averages);
         const double of_data_place = abscissa_noise_ / std::sqrt(averaged);
         stations_.push_back(station);
-        errors_.push_back({{std::max(std::hypot(of_length, of_data_place), of_jump), 0, 0}});
+        const double least = one_place * smoothing_window * (to - from);
+        errors_.push_back({{std::max({std::hypot(of_length, of_data_place), of_jump, least}), 0, 0}});
         reach.push_back(std::max(0.5 * arrival_window_, of_jump));
     }
     const std::vector<FitResidual> alone(stations_.begin() + static_cast<std::ptrdiff_t>(first), stations_.end());
@@ -602,6 +647,8 @@ std::vector<double> Comparison::on_curves(const Record& record, double slack_for
             ++force_tile;
         } else if (station.kind == "arrival") {
             values.push_back(crack.arrival(station.at).value_or(end + pace_ * (station.at - longest)));
+        } else if (station.kind == "break") {
+            values.push_back(break_of(abscissa, forces));
         } else if (station.kind == "crack_length") {
             values.push_back(length.mean(tile->first, tile->second));
             ++tile;

@@ -35,6 +35,10 @@ namespace crampfit {
 /// missing length, the displacement that the test took on average for as much growth: finite, continuous, and larger
 /// the shorter the crack.
 ///
+/// Break: where no crack length is measured and the force falls, from one row to the next and for good, to less than half of the
+/// highest, the displacement (time) at which it did. In rows that are farther apart than the model's jump goes from run to run
+/// the forces beside it are there or not, and lead nowhere.
+///
 /// Crack length: at displacements (times), as force is, over what windows of arrivals leave: tiles about a window wide between
 /// them, or single rows, so that every row counts once, also where the crack stands or grows by less than noise, which says
 /// little of when.
@@ -75,6 +79,7 @@ class Comparison {
     void add_curves(const Experiment& experiment);
     std::vector<double> on_curves(const Record& record, double slack_force) const;
     void add_force_stations(const Experiment& experiment);
+    void add_break(const Experiment& experiment, const Curve& rows, double noise, double least_fall);
     void add_crack_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);

@@ -119,6 +119,10 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
         if (solution.converged && left < explained && looks_like_noise) {
             break;
         }
+        // Others have not come to their ends: one of them may go lower.
+        if (!solution.converged && left > unexplained) {
+            result.converged = false;
+        }
         descents = left > unexplained || !looks_like_noise ? std::max(starts, least_starts_where_unexplained) : starts;
     }
     result.method = fmt::format("auto: {} starting points side by side, then steps from the best of them to the least "
