@@ -30,8 +30,8 @@ double peak_force(const Record& record) {
 }
 
 double initial_stiffness(const Record& record) {
-    constexpr double begins = 1e-3;  // of the peak
-    constexpr double start = 0.1;    // of the way to the peak: what stiffens or gives way later on must not count
+    constexpr double begins = 1e-6;  // of the peak
+    constexpr double start = 0.02;   // of the way to the peak: what stiffens or gives way later on must not count
     const auto size = [](const Instant& row) { return std::abs(row.force); };
     const Instant& peak = *std::ranges::max_element(record.series, {}, size);
     const auto first = std::ranges::find_if(record.series, [&](const Instant& row) { return size(row) > begins * size(peak); });

@@ -206,6 +206,27 @@ TEST(SlowVerificationBridging, GrowsAtTheEnergyOfTipAndBridges) {
     check_growing(0.1e-3, 0.5, {1e6, 2e6}, 0.05);
 }
 
+TEST(VerificationBridging, PullsOnWhereTheTipHasGoneThrough) {
+    // What parts the specimen takes toughness and bridges, however long they outlast the tip.
+    Scene scene = at_motion(block({8e-3, 6e-3}, 0.25e-3));
+    scene.materials["EW"] = {.youngs_modulus = 400e6, .poisson_ratio = 0.3, .density = 500.0, .toughness = 100.0};
+    scene.edges = {moving("top", Side::top, {0.0, 0.5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(0.0, 3e-3), Vec2(4e-3, 3e-3)};
+    crack.grows = Growth::end;
+    crack.direction = GrowthDirection::straight;
+    crack.faces.bridging = Bridging{1e6, 0.2e-3};
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 3e-3;
+    const Record record = simulate(scene);
+    const double spent = record.series.back().fracture_energy / (4e-3 * scene.model.thickness);
+    std::printf("bridged crack, gone through at %.3f mm or before: %.1f J/m^2 of 100 + 100; %s\n",
+                1e3 * record.series.back().displacement, spent, record.message.c_str());
+    EXPECT_EQ(record.status, RunStatus::split) << record.message;
+    EXPECT_NEAR(spent, 200.0, 6.0);
+}
+
 TEST(UnitBridging, DoesNotDependOnThreads) {
     Scene scene = strip(0.2e-3, 0.06e-3, 0.2, Bridging{1e6, 0.1e-3});
     Record first;

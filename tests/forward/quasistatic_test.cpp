@@ -582,6 +582,41 @@ TEST(UnitKeptWalk, OtherToughnessesAsIfRunAlone) {
     }
 }
 
+// An arm that stiffens as it is pulled off: what it does at first is not to hang on how far it goes, though the loading goes by
+// steps of its whole way, and its forces are the slope of its energy between them.
+TEST(VerificationQuasistatic, SmallLoadsHangNotOnTheEndOfTheLoading) {
+    Scene scene = block({30e-3, 3e-3}, 0.25e-3);
+    scene.materials["EW"].youngs_modulus = 1000e6;
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.solver.strain = StrainMeasure::finite_rotation;
+    scene.edges = {without(moving("arm", Side::left, {0.0, 1e-3 / 60}), 0), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.edges[0].range = {{2.5e-3, 3e-3}};
+    Crack crack;
+    crack.points = {Vec2(0.0, 2.5e-3), Vec2(12e-3, 2.5e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"arm", "arm"};
+    double first = 0.0, force = 0.0;
+    for (const double end : {2e-3, 8e-3}) {
+        scene.stop.displacement = end;
+        const Record record = simulate(scene);
+        const Instant &row = record.series[2], &last = record.series.back();
+        const auto at = [&](double u) {
+            const auto next = std::ranges::lower_bound(record.series, u, {}, &Instant::displacement);
+            const Instant& before = *std::prev(next);
+            return std::lerp(before.force, next->force, (u - before.displacement) / (next->displacement - before.displacement));
+        };
+        std::printf("arm pulled by %.0f mm: %.4f N/mm at first, %.4f N at 1.9 mm; work %+.1e off the energy\n", 1e3 * end,
+                    1e-3 * row.force / row.displacement, at(1.9e-3), last.external_work / last.strain_energy - 1);
+        EXPECT_NEAR(last.external_work / last.strain_energy, 1.0, 1e-3);
+        if (first > 0.0) {
+            EXPECT_NEAR(row.force / row.displacement, first, 0.005 * first);
+            EXPECT_NEAR(at(1.9e-3), force, 0.005 * force);
+        }
+        first = row.force / row.displacement;
+        force = at(1.9e-3);
+    }
+}
+
 // Turned so far that the plan takes finite rotation: a strip pulled to a tenth of its height.
 Scene stretched() {
     Scene scene = at_equilibrium(block({20e-3, 8e-3}, 0.5e-3));

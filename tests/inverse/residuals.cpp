@@ -514,6 +514,54 @@ TEST(UnitResiduals, AJumpAtTheEndIsTimedContinuously) {
     }
 }
 
+// A full break that a single row has seen, at the displacement of the row before or behind it.
+Record broken_at(double place, double behind, int rows) {
+    Record record = straight(1e5, 0, place, rows);
+    Instant last = record.series.back();
+    last.displacement += behind;
+    last.force = 0;
+    last.crack_length = 10e-3;
+    record.series.push_back(last);
+    return record;
+}
+
+TEST(UnitResiduals, ABreakThatOneRowHasSeenHasAFiniteWeightAndATime) {
+    for (const int rows : {10, 41, 60, 400}) {
+        for (const double behind : {0.0, 1e-9, 0.5 / rows * 1e-3}) {
+            Experiment experiment = straight_experiment();
+            experiment.data = measure(broken_at(1e-3, behind, rows), 0, 0, 1);
+            const Record model = broken_at(0.9e-3, 0.0, 2000), same = broken_at(1e-3 + 0.5 * behind, 0.0, 2000);
+            const Comparison with_lengths(experiment);
+            for (const FitResidual& station : with_lengths.stations()) {
+                EXPECT_GT(station.sigma, 0) << station.kind;
+            }
+            EXPECT_TRUE(of_kind(with_lengths, "break").empty());
+            for (double& length : experiment.data.crack_length) {
+                length = std::nan("");
+            }
+            const Comparison comparison(experiment);
+            ASSERT_EQ(of_kind(comparison, "break").size(), 1u) << rows << " rows, " << behind;
+            const Eigen::VectorXd early = comparison.modelled(model), right = comparison.modelled(same);
+            for (std::size_t i = 0; i < comparison.stations().size(); ++i) {
+                const FitResidual& station = comparison.stations()[i];
+                EXPECT_GT(station.sigma, 0);
+                if (station.kind == "break") {
+                    EXPECT_NEAR(early[static_cast<Eigen::Index>(i)], 0.9e-3, 1e-9);
+                    EXPECT_NEAR(right[static_cast<Eigen::Index>(i)], station.measured, 1e-9);
+                } else {
+                    EXPECT_NEAR(right[static_cast<Eigen::Index>(i)], station.measured, 2 * station.sigma) << station.at;
+                }
+            }
+        }
+    }
+    // One that falls row by row has no time of its own.
+    Experiment experiment = straight_experiment();
+    for (double& length : experiment.data.crack_length) {
+        length = std::nan("");
+    }
+    EXPECT_TRUE(of_kind(Comparison(experiment), "break").empty());
+}
+
 TEST(UnitResiduals, NoiseThatIsNotGivenIsEstimatedAndSaidSo) {
     Experiment experiment = straight_experiment();
     experiment.noise = {};

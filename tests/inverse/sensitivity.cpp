@@ -275,6 +275,19 @@ TEST(UnitOutputs, AreReadFromTheRecord) {
     EXPECT_DOUBLE_EQ(output_of(whole, {"", Kind::crack_length_at, 2e-3, 0}), 8e-3);
 }
 
+TEST(UnitOutputs, InitialStiffnessIsThatOfTheStart) {
+    Record record;
+    for (int i = 0; i <= 200; ++i) {
+        Instant row;
+        row.displacement = 1e-3 * i / 200.0;
+        const double beyond_gap = std::max(0.0, row.displacement - 0.1e-3);
+        row.force = 1e4 * beyond_gap + 1e12 * std::pow(beyond_gap, 3);  // it begins late, and stiffens by far
+        record.series.push_back(row);
+    }
+    const double told = output_of(record, {"", StudyOutput::Kind::initial_stiffness, 0, 0});
+    EXPECT_NEAR(told, 1e4, 0.1e4);  // at the end it is 2.4e6
+}
+
 Study output_study(SensitivityMethod method, int samples) {
     Study study = wedge_study(FakeWedge{});
     study.scene = study.experiments[0].scene;
