@@ -14,6 +14,8 @@ constexpr double least_step = 0.002;   // of the box: below it, a run's own nois
 constexpr double largest_step = 0.1;   // of the box
 constexpr int runs_of_a_descent = 60;  // for each of the others
 constexpr int runs_across_kinks = 30;  // the same
+constexpr double cliff = 4.0;          // times the rise that is looked for: it comes at once, as where a crack begins to run
+constexpr int halvings = 7;            // of the way across that
 
 // x with its coordinate j left out, or put in.
 Eigen::VectorXd without(const Eigen::VectorXd& x, Eigen::Index j) {
@@ -54,6 +56,20 @@ std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& star
     return there && there->usable() ? std::optional(Run{start, there}) : std::nullopt;
 }
 
+// Points between one that is not as high as `least` + `rise` and one beyond, halving the way for as long as a cliff lies in it.
+std::vector<Run> close_in(Objective& objective, Run inside, Run outside, Eigen::Index j, double least, double rise) {
+    std::vector<Run> between;
+    for (int i = 0; i < halvings && outside.evaluation->misfit > least + cliff * rise && !objective.exhausted(); ++i) {
+        const auto lowest = lowest_with(objective, 0.5 * (inside.x + outside.x), j);
+        if (!lowest) {
+            break;
+        }
+        between.push_back(*lowest);
+        (lowest->evaluation->misfit < least + rise ? inside : outside) = *lowest;
+    }
+    return between;
+}
+
 }  // namespace
 
 Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise) {
@@ -61,6 +77,7 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
     Profile below, above;
     for (auto* side : {&below, &above}) {
         Eigen::VectorXd from = best.x, before = best.x;
+        Run last = best;
         for (int i = 0; i < most_steps && !objective.exhausted(); ++i) {
             // On in the direction in which the last step went, which in a linear problem leads along the valley.
             const double held = std::clamp(from[j] + (side == &below ? -step : step), 0.0, 1.0);
@@ -73,14 +90,22 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
             if (!lowest) {
                 break;
             }
-            side->x.push_back(held);
-            side->misfit.push_back(lowest->evaluation->misfit);
-            side->lowest.push_back(lowest->x);
+            const auto take_in = [&](const Run& run) {
+                side->x.push_back(run.x[j]);
+                side->misfit.push_back(run.evaluation->misfit);
+                side->lowest.push_back(run.x);
+            };
             if (lowest->evaluation->misfit > best.evaluation->misfit + 1.5 * rise) {
+                auto between = close_in(objective, last, *lowest, j, best.evaluation->misfit, rise);
+                std::ranges::sort(between, {}, [&](const Run& run) { return std::abs(run.x[j] - best.x[j]); });
+                std::ranges::for_each(between, take_in);
+                take_in(*lowest);
                 break;
             }
+            take_in(*lowest);
             before = from;
             from = lowest->x;
+            last = *lowest;
         }
     }
     Profile profile;
@@ -126,6 +151,7 @@ std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::
     constexpr double farthest = 2.0;  // of the distance before
     const double level = std::sqrt(rise);
     double inside = 0, height_inside = 0;
+    Run last = best;
     Eigen::VectorXd away = valley;
     for (int i = 0; i < most_trials && !objective.exhausted(); ++i) {
         Eigen::VectorXd start = (best.x + side * distance * away).cwiseMax(0.0).cwiseMin(1.0);
@@ -139,8 +165,18 @@ std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::
         }
         const double height = std::sqrt(std::max(0.0, lowest->evaluation->misfit - least));
         if (height >= level) {
-            return i == 0 ? distance : std::lerp(inside, distance, (level - height_inside) / (height - height_inside));
+            if (i == 0) {
+                return distance;
+            }
+            double outside = distance, height_outside = height;
+            for (const Run& run : close_in(objective, last, *lowest, j, least, rise)) {
+                const double there = std::sqrt(std::max(0.0, run.evaluation->misfit - least));
+                (there < level ? inside : outside) = std::abs(run.x[j] - best.x[j]);
+                (there < level ? height_inside : height_outside) = there;
+            }
+            return std::lerp(inside, outside, (level - height_inside) / (height_outside - height_inside));
         }
+        last = *lowest;
         inside = distance;
         height_inside = height;
         away = side * (lowest->x - best.x) / distance;

@@ -166,6 +166,31 @@ TEST(VerificationProfile, EndsOfALinearProblemAreFoundFromAGuess) {
     }
 }
 
+// Beyond a cliff, as where a crack that stood in the test would have run, and flat before it: the end is at the cliff, wherever
+// it lies between two steps.
+TEST(VerificationProfile, EndsAtACliffAreThere) {
+    for (const double cliff : {0.2337, 0.31, 0.4449}) {
+        Objective objective(
+            2,
+            [&](const Eigen::VectorXd& x, int) {
+                Evaluation evaluation;
+                evaluation.residuals = Eigen::Vector2d(20 * (x[1] - 0.5), x[0] < cliff ? 100.0 : 0.0);
+                evaluation.misfit = evaluation.residuals.squaredNorm();
+                return evaluation;
+            },
+            100000, 1);
+        const Eigen::Vector2d centre(0.6, 0.5);
+        const crampfit::Run best{centre, objective.at(centre)};
+        const Profile profile = profile_likelihood(objective, best, 0, 0.2, 1.96 * 1.96);
+        EXPECT_TRUE(std::ranges::is_sorted(profile.x));
+        EXPECT_NEAR(interval(profile, 0, 1.96 * 1.96).first, cliff, 0.001);
+        EXPECT_EQ(interval(profile, 0, 1.96 * 1.96).second, 1);
+        const auto end = profile_end(objective, best, 0, -1, 0.1, Eigen::Vector2d::Unit(0), 0, 1.96 * 1.96);
+        ASSERT_TRUE(end);
+        EXPECT_NEAR(0.6 - *end, cliff, 0.003);
+    }
+}
+
 FitOptions cheap(const FakeWedge& wedge, int threads) {
     FitOptions options = with(wedge, threads);
     options.cheap_runs = true;

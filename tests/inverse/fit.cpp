@@ -311,6 +311,22 @@ TEST(SystemFit, KeepsToTheRunLimit) {
     }
 }
 
+// A misfit far above the noise may be a basin: that further starts ended with their runs is no end.
+TEST(SystemFit, StartsCutShortAreNoEndWhereNoiseDoesNotExplain) {
+    const FakeWedge wedge;
+    Study study = wedge_study(wedge, 0.02, 1e-4);
+    FakeWedge other = wedge;
+    other.ring *= 1.3;  // no values explain that
+    study.optimizer.max_runs = 60;
+    const Fit cut = fit_study(study, with(other));
+    study.optimizer.max_runs = 2000;
+    const Fit whole = fit_study(study, with(other));
+    std::printf("wrong rings: reduced chi-square %.0f after %zu runs: %s\n%.0f after %zu: %s\n", cut.reduced_chi_square,
+                cut.runs.size(), cut.method.c_str(), whole.reduced_chi_square, whole.runs.size(), whole.method.c_str());
+    EXPECT_EQ(cut.status, FitStatus::run_limit);
+    EXPECT_EQ(whole.status, FitStatus::converged);
+}
+
 TEST(SystemFit, AnInterruptEndsItWithWhatItHas) {
     const FakeWedge wedge;
     for (const char* method : {"auto", "ceres", "bobyqa", "crs2"}) {
