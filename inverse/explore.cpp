@@ -131,11 +131,15 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertain
         parameter.lower_95 = value_at(std::max(0.0, x - std::hypot(x - lower, own)));
         parameter.upper_95 = value_at(std::min(1.0, x + std::hypot(upper - x, own)));
         if (lower == 0.0 || upper == 1.0) {
-            fit.message += fmt::format("The data do not bound '{}' {} within {}. ", parameter.name,
-                                       lower > 0.0   ? "above"
-                                       : upper < 1.0 ? "below"
-                                                     : "above or below",
-                                       profile.x.front() > 0.0 && profile.x.back() < 1.0 ? "many standard errors" : "its bounds");
+            const std::string text =
+                fmt::format("The data do not bound '{}' {} within {}. ", parameter.name,
+                            lower > 0.0   ? "above"
+                            : upper < 1.0 ? "below"
+                                          : "above or below",
+                            profile.x.front() > 0.0 && profile.x.back() < 1.0 ? "many standard errors" : "its bounds");
+            if (fit.message.find(text) == std::string::npos) {
+                fit.message += text;
+            }
         }
     }
     if (!exploration.profiles.empty() && fit.message.find("profile likelihood") == std::string::npos) {

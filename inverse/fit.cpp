@@ -109,6 +109,7 @@ FittedParameter describe(const Parameter& parameter) {
 // From the unit cube to the parameters' units: intervals end by end, so that on a log scale they are not symmetric; the
 // covariance by the slope at the best point (delta method).
 void fill_parameters(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, const Uncertainty& uncertainty) {
+    constexpr double most_of_box = 0.5;
     const Eigen::Index p = box.size();
     Eigen::VectorXd slope(p);
     for (Eigen::Index j = 0; j < p; ++j) {
@@ -120,8 +121,12 @@ void fill_parameters(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, con
         fitted.lower_95 = box.value(j, uncertainty.lower_95[j]) / parameter.unit_factor;
         fitted.upper_95 = box.value(j, uncertainty.upper_95[j]) / parameter.unit_factor;
         fitted.at_bound = x[j] < bound_tolerance || x[j] > 1 - bound_tolerance;
+        const bool to_lower = uncertainty.lower_95[j]<bound_tolerance, to_upper = uncertainty.upper_95[j]> 1 - bound_tolerance;
         if (fitted.at_bound) {
             fit.message += fmt::format("'{}' stands at its {} bound. ", parameter.name, x[j] < 0.5 ? "lower" : "upper");
+        } else if (to_lower != to_upper && uncertainty.upper_95[j] - uncertainty.lower_95[j] > most_of_box) {
+            fit.message +=
+                fmt::format("The data do not bound '{}' {} within its bounds. ", parameter.name, to_lower ? "below" : "above");
         }
         fit.parameters.push_back(fitted);
     }

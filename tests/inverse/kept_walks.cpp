@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 namespace crampfit::testing {
 namespace {
@@ -264,6 +265,67 @@ void expect_truth(const Fit& fit, const Scene& scene) {
     }
     std::printf("\n");
     EXPECT_EQ(fit.status, FitStatus::converged);
+}
+
+// One wood, torn apart at once: rows of force before the break and, where there is one, behind it.
+Study torn_plate(double rows_end, std::optional<double> broken_row) {
+    Scene scene = across_inclined_rings(GrowthDirection::straight);
+    scene.specimen.rings.reset();
+    scene.specimen.material = "EW";
+    scene.materials.erase("LW");
+    scene.stop.crack_length.reset();
+    const Record record = simulate(scene);
+    const Instant& peak = *std::ranges::max_element(record.series, {}, &Instant::force);
+    Study study = toughness_study(scene);
+    study.parameters.pop_back();
+    study.parameters[0].name = "toughness";
+    study.parameters[0].initial = 60;
+    study.parameters[0].scale = Scale::logarithmic;
+    Experiment& experiment = study.experiments[0];
+    experiment.name = "plate";
+    experiment.noise.force = 0.005 * peak.force;
+    const auto add = [&](double u, double force) {
+        experiment.data.displacement.push_back(u);
+        experiment.data.force.push_back(force);
+    };
+    for (int i = 1; i <= 30; ++i) {
+        const double u = rows_end * peak.displacement * i / 30;
+        add(u, peak.force * u / peak.displacement + (i % 2 == 0 ? 0.004 : -0.004) * peak.force);
+    }
+    if (broken_row) {
+        add(*broken_row * peak.displacement, 0.0);
+    }
+    return study;
+}
+
+TEST(SystemKeptWalks, ABreakThatOneRowHasSeenTellsTheToughness) {
+    for (const double broken : {0.999, 1.01, 1.025}) {  // at the displacement of the row before, and behind it
+        const Fit fit = fit_study(torn_plate(0.999, broken), {});
+        const FittedParameter& found = fit.parameters[0];
+        std::printf("row of the break at %.3f of it: toughness %.1f [%.1f, %.1f] of 100\n", broken, found.value, found.lower_95,
+                    found.upper_95);
+        EXPECT_LT(found.lower_95, 100);
+        EXPECT_GT(found.upper_95, 100);
+        EXPECT_NEAR(found.value, 100, 4);
+    }
+}
+
+TEST(SystemKeptWalks, ACrackThatStandsTellsALowerLimitAlone) {
+    // At 0.9 of the displacement it would run with 0.81 of the toughness.
+    for (const bool profile : {false, true}) {
+        Study study = torn_plate(0.9, {});
+        study.uncertainty.profile = profile;
+        const Fit fit = fit_study(study, {});
+        const FittedParameter& found = fit.parameters[0];
+        std::printf("stands: toughness %.1f [%.1f, %.1f]: %s\n", found.value, found.lower_95, found.upper_95,
+                    fit.message.c_str());
+        const std::string said = "The data do not bound 'toughness' above within its bounds.";
+        const auto at = fit.message.find(said);
+        EXPECT_NE(at, std::string::npos);
+        EXPECT_EQ(fit.message.find(said, at + 1), std::string::npos);
+        EXPECT_NEAR(found.lower_95, 81, 3);
+        EXPECT_EQ(found.upper_95, 800);
+    }
 }
 
 // Moduli turn the crack, and a point of the grid that it passes on the other side is a jump of the misfit: the true values lie
