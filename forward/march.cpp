@@ -204,7 +204,8 @@ class March {
         const bool plastic = std::any_of(materials_.materials().begin(), materials_.materials().end(),
                                          [](const Material& m) { return m.plastic; });
         if (record_.series.size() <= 1 && outcome_ == Equilibrium::Outcome::mechanism && !plastic && !plan_.friction)
-            throw InputError(scene_.file.string(), "edges", "too few", "the specimen, or a piece that cracks cut off it, can move as a whole: nothing holds it");
+            throw InputError(scene_.file.string(), "edges", "too few",
+                             "the specimen, or a piece that cracks cut off it, can move as a whole: nothing holds it");
         record_.status = RunStatus::unstable;
         record_.message = "no equilibrium was found at " + std::to_string(time) + " s" +
                           (plastic ? "; the load may be more than the wood can carry" : "") +

@@ -96,7 +96,8 @@ Quasistatic::Quasistatic(const Scene& scene, const Plan& plan, const MaterialMap
     const bool is_loose =
         outcome_ == Equilibrium::Outcome::mechanism || (coarse() && coarse()->outcome_ == Equilibrium::Outcome::mechanism);
     if (is_loose && !plan.friction)  // which may hold a smaller load
-        throw InputError(scene.file.string(), "edges", "too few", "the specimen, or a piece that cracks cut off it, can move as a whole: nothing holds it");
+        throw InputError(scene.file.string(), "edges", "too few",
+                         "the specimen, or a piece that cracks cut off it, can move as a whole: nothing holds it");
     fail();
 }
 

@@ -76,7 +76,7 @@ class Tracer {
 
     Record run() {
         follow();
-        if (!walk_.failure().empty() && goes_on_left_) {  // pieces that hold no longer
+        if (!walk_.failure().empty() && goes_on_left_ && record_.message != met) {  // pieces that hold no longer
             split();
         } else if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
             record_.status = RunStatus::unstable;
