@@ -63,6 +63,16 @@ double cubic(double from, double slope_from, double to, double slope_to, double 
     return from * (1.0 + 2.0 * s) * r * r + slope_from * s * r * r + to * s * s * (3.0 - 2.0 * s) - slope_to * s * s * r;
 }
 
+// What forces on their straight way between two states are multiplied by, at a fraction of it, to have done the work by which the
+// potential differs: their power follows the parabola of that mean, or the nearest that does not turn on the way.
+double bend(const LoadState& from, const LoadState& to, double s) {
+    const double straight = std::lerp(from.power, to.power, s);
+    if (straight == 0.0 || from.power * to.power < 0.0) return 1.0;
+    const double rise = std::abs(to.power - from.power);
+    const double lacks = (to.potential - from.potential) / (to.time - from.time) - 0.5 * (from.power + to.power);
+    return 1.0 + std::clamp(6.0 * lacks, -rise, rise) * s * (1.0 - s) / straight;
+}
+
 }  // namespace
 
 LoadState scaled(const LoadState& state, double factor) {
@@ -82,16 +92,6 @@ LoadState scaled(const LoadState& state, double factor) {
         tip.opening *= factor;
     }
     return at;
-}
-
-// What forces on their straight way between two states are multiplied by, at a fraction of it, to have done the work by which the
-// potential differs: their power follows the parabola of that mean, or the nearest that does not turn on the way.
-double bend(const LoadState& from, const LoadState& to, double s) {
-    const double straight = std::lerp(from.power, to.power, s);
-    if (straight == 0.0 || from.power * to.power < 0.0) return 1.0;
-    const double rise = std::abs(to.power - from.power);
-    const double lacks = (to.potential - from.potential) / (to.time - from.time) - 0.5 * (from.power + to.power);
-    return 1.0 + std::clamp(6.0 * lacks, -rise, rise) * s * (1.0 - s) / straight;
 }
 
 LoadState between(const LoadState& from, const LoadState& to, double time) {

@@ -146,25 +146,27 @@ class GrowthByRows {
     bool ends_with_jump_ = false;
 };
 
-// The last node at which a force is as high as that part of its highest.
+// What a force must stay below to have broken.
+double level_of_break(std::span<const double> force) {
+    const auto [least, most] = std::ranges::minmax(force);
+    return broken * std::max(std::abs(least), std::abs(most));
+}
+
+// The last node at which a force is no lower.
 std::size_t last_before_break(std::span<const double> force) {
-    double highest = 0;
-    for (const double f : force) {
-        highest = std::max(highest, std::abs(f));
-    }
-    const auto holds = [&](double f) { return std::abs(f) >= broken * highest; };
+    const double level = level_of_break(force);
+    const auto holds = [&](double f) { return std::abs(f) >= level; };
     return static_cast<std::size_t>(force.rend() - std::find_if(force.rbegin(), force.rend(), holds)) - 1;
 }
 
-// Where a force comes down to that part for good; its end where it does not.
+// Where a force comes down to that for good; its end where it does not.
 double break_of(std::span<const double> x, std::span<const double> force) {
     const std::size_t last = last_before_break(force);
     if (last + 1 == force.size()) {
         return x[last];
     }
-    const double highest = std::abs(*std::ranges::max_element(force, {}, [](double f) { return std::abs(f); }));
     const double before = std::abs(force[last]), after = std::abs(force[last + 1]);
-    return std::lerp(x[last], x[last + 1], (before - broken * highest) / (before - after));
+    return std::lerp(x[last], x[last + 1], (before - level_of_break(force)) / (before - after));
 }
 
 // Of how many rows the nodes on both sides of a place are the mean, at the least.
@@ -471,13 +473,14 @@ void Comparison::add_force_stations(const Experiment& experiment) {
 
 // Where one row alone, or few, have seen that the specimen breaks, they say that it has; this says when.
 void Comparison::add_break(const Experiment& experiment, const Curve& rows, double noise, double least_fall) {
+    constexpr double farthest = 0.1;  // of all that was measured: rows farther apart time nothing
     const std::size_t last = last_before_break(rows.y());
     if (last + 1 == rows.y().size()) {
         return;
     }
     const double x = rows.x()[last], apart = rows.x()[last + 1] - x, before = std::abs(rows.y()[last]);
     const bool at_once = before - std::abs(rows.y()[last + 1]) > std::max(least_fall, broken * peak_force_);
-    if (!at_once || apart > smoothing_window * 5 * (rows.x().back() - rows.x().front())) {
+    if (!at_once || apart > farthest * (rows.x().back() - rows.x().front())) {
         return;
     }
     // It was anywhere between both rows, and the force that it took is known to the noise.
