@@ -48,7 +48,7 @@ Overrides overrides_of(const CommonOptions& common) {
     for (const std::string& setting : common.settings) {
         const std::size_t equals = setting.find('=');
         if (equals == std::string::npos || equals == 0) throw InputError("command line", "--set", setting, "must be KEY=VALUE");
-        overrides.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+        overrides.emplace_back(trim(setting.substr(0, equals)), trim(setting.substr(equals + 1)));
     }
     return overrides;
 }

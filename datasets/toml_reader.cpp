@@ -65,7 +65,9 @@ toml::table parse_toml(const std::string& text, const std::string& file) {
         return toml::parse(text);
     } catch (const toml::parse_error& error) {
         const toml::source_position& at = error.source().begin;
-        throw InputError(file, "", "", fmt::format("line {}, column {}: {}", at.line, at.column, error.description()));
+        std::string what(error.description());
+        std::ranges::replace(what, '\n', ' ');  // a message is one line
+        throw InputError(file, "", "", fmt::format("line {}, column {}: {}", at.line, at.column, what));
     }
 }
 
@@ -201,6 +203,14 @@ std::optional<Entry> Entry::find(const std::string& name) const {
 Entry Entry::at(const std::string& name) const {
     if (const auto entry = find(name)) {
         return *entry;
+    }
+    for (const Document::Applied& applied : document_->applied_) {
+        const bool made_this = address_ == applied.address || is_under(address_, applied.address);
+        if (made_this && is_under(applied.target, address_)) {
+            throw InputError(command_line, applied.key, applied.value,
+                             fmt::format("there is no {} in {}, and {} would be missing in a new one", key_,
+                                         document_->file().string(), join_key(key_, name)));
+        }
     }
     Entry(*document_, nullptr, join_key(key_, name), join_key(address_, name)).fail("missing key: it must be given");
 }

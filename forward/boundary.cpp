@@ -2,6 +2,8 @@
 
 #include "datasets/error.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -97,6 +99,15 @@ Gauges::Gauges(const Scene& scene) {
     force = driver_named(scene.measure.force);
     force_direction = direction_of(force);
     if (force_direction.isZero(0.0)) force_direction = -displacement_direction;  // a fixed support feels the opposite of the load
+    if (force < edges && !scene.edges[force].traction) {
+        const Edge& edge = scene.edges[force];
+        const auto held = [&](int axis) { return edge.velocity[axis].has_value(); };
+        const bool feels = (held(0) && force_direction.x() != 0.0) || (held(1) && force_direction.y() != 0.0);
+        if (const int along = along_side(edge.side), across = 1 - along; !feels && (held(along) || held(across))) {
+            const bool low = edge.side == Side::left || edge.side == Side::bottom;
+            force_direction = held(across) ? Vec2(Vec2::Unit(across) * (low ? -1.0 : 1.0)) : Vec2(Vec2::Unit(along));
+        }
+    }
 }
 
 std::vector<double> field_masses(const Discretisation& body, int fields) {
@@ -205,13 +216,15 @@ void Boundary::hold_nodes(const CrackFields& cracks, const MaterialMap* material
                 }
             }
         }
+        const auto refuse_range = [&](const char* rule) {
+            const auto [from, to] = edge.range.value_or(std::pair(0.0, 0.0));
+            throw InputError(scene_.file.string(), "edges." + edge.name + ".range",
+                             edge.range ? fmt::format("{:g} mm, {:g} mm", 1e3 * from, 1e3 * to) : "(missing)", rule);
+        };
         const bool prescribes = edge.velocity[0] || edge.velocity[1];
         if (found > 0 && holds == 0 && prescribes)
-            throw InputError(scene_.file.string(), "edges." + edge.name, "velocity",
-                             "edges before it hold all that it would hold: give each its own range");
-        if (found == 0)
-            throw InputError(scene_.file.string(), "edges." + edge.name, "range",
-                             "no node of the grid lies on this stretch of the side");
+            refuse_range("edges before it hold all that it would hold: give each its own range");
+        if (found == 0) refuse_range("no node of the grid lies on this stretch of the side");
     }
     for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
         const Body& grip = scene_.bodies[b];

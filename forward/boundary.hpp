@@ -99,7 +99,7 @@ struct Gauges {
 
     int force = 0;                // driver
     int displacement = 0;         // driver
-    Vec2 force_direction;         // unit; zero: nothing is driven
+    Vec2 force_direction;         // unit; of a fixed edge that holds nothing along the load: outward; zero: nothing is driven
     Vec2 displacement_direction;  // unit; zero: nothing is driven
 };
 

@@ -132,7 +132,8 @@ Discretisation::Discretisation(const Scene& scene, const MaterialMap& materials,
     find_weights(kind == ShapeFunction::automatic ? ShapeFunction::gimp : kind);
     place_points(scene, materials);
     if (points.count() == 0)
-        throw InputError(scene.file.string(), "specimen", scene.title, "no material is left: cutouts or void cover it all");
+        throw InputError(scene.file.string(), scene.specimen.cutouts.empty() ? "specimen" : "specimen.cutouts", "(all of it)",
+                         "no material is left: cutouts or void cover it all");
     if (!points.part.empty()) check_parts(scene);
     find_facets(scene);
     if (!materials.homogeneous()) mark_changes();

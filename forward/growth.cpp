@@ -109,14 +109,16 @@ double trust_in_intensities(const CrackTip& tip, const MaterialMap& materials, d
 // Nairn's opening is that just behind the tip. What the grid shows there swings by 3 degrees with the tip's place in a cell, as
 // points change sides; K_I and K_II, from a domain about the tip, tell it within 0.3. Near other wood, twice as stiff or half so,
 // it is the better one, and a crack must not turn at once where the one takes over from the other.
-double normal_to_opening(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment) {
+double normal_to_opening(const CrackTip& tip, const TipLoad& load, const MaterialMap& materials, double increment,
+                         bool may_turn) {
     const double by_grid = normal_angle(tip, load.opening);
     const LocalWood wood = materials.at(tip.position);
     if (!std::isfinite(load.K_I) || wood.plane_modulus() <= 0.0) return by_grid;  // a void has no K
     const double trust = trust_in_intensities(tip, materials, 0.5 * increment, increment, 1.0, 1.0);
     const NearTipField field = near_tip_field(wood.elasticity.stiffness(), tip.direction);
     const Vec2 opening = field.release() * Vec2(load.K_I, load.K_II);  // by K_I across, by K_II along
-    const double by_intensities = normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction);
+    const double by_intensities =
+        may_turn ? normal_angle(tip, opening[0] * left_of(tip.direction) + opening[1] * tip.direction) : 0.0;
     return std::lerp(by_grid, by_intensities, trust);
 }
 
@@ -166,8 +168,9 @@ double least_leg_in_cells(const CrackLine& line, bool at_end) {
 }
 
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
-                      double increment) {
+                      double increment, bool may_turn) {
     if (steered_by_intensities(criterion)) {
+        if (!may_turn) return tip.direction;
         // From wood of 1.4 to wood of 2.8 times the stiffness: no small change of a modulus, by which a pixel would count or not,
         // turns a crack.
         const double trust = trust_in_intensities(tip, materials, 0.75 * increment, 1.25 * increment, 0.5, 1.5);
@@ -180,7 +183,7 @@ Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad lo
         case GrowthDirection::straight:
             return tip.direction;
         case GrowthDirection::normal_to_opening:
-            return turned(tip.direction, normal_to_opening(tip, load, materials, increment)).normalized();
+            return turned(tip.direction, normal_to_opening(tip, load, materials, increment, may_turn)).normalized();
         case GrowthDirection::hoop_stress: {
             const double angle =
                 materials.orthotropic() ? hoop_stress_angle(tip, load, materials) : hoop_stress_angle(load.K_I, load.K_II);

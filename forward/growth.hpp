@@ -24,8 +24,9 @@ double least_leg_in_cells(const CrackLine& line, bool at_end);
 /// Which way a crack tip goes on: a unit vector. The next `increment` [m] is what "energy release rate" weighs toughness over.
 /// Where the wood is much stiffer or softer about so far away, ahead, behind or to a side, a crack that K_I and K_II steer goes
 /// as in pure mode I: they mean little at a boundary. "normal to opening" takes the opening that they tell, as far as they are
-/// known (not a number: unknown), and near such wood the one that is seen. Between, both have a share.
+/// known (not a number: unknown), and near such wood the one that is seen. Between, both have a share. Where K_I and K_II may not
+/// turn the crack, as so soon after its last turn, they let it go straight.
 Vec2 growth_direction(GrowthDirection criterion, const CrackTip& tip, TipLoad load, const MaterialMap& materials,
-                      double increment);
+                      double increment, bool may_turn = true);
 
 }  // namespace crampfit

@@ -378,8 +378,8 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                 scene, "edges." + edge.name + ".traction", "0 MPa, 0 MPa",
                 "measure.displacement goes along the traction of this edge, which says no direction: a small one does, as 1 Pa");
     if (!may_end(scene))
-        refuse(scene, "stop",
-               scene.stop.displacement ? fmt::format("displacement {:g} mm", 1e3 * *scene.stop.displacement) : "crack_length",
+        refuse(scene, scene.stop.displacement ? "stop.displacement" : "stop.crack_length",
+               fmt::format("{:g} mm", 1e3 * scene.stop.displacement.value_or(scene.stop.crack_length.value_or(0.0))),
                "the run would never end: what is measured does not get there, and no time ends it");
     plan.remembers = materials.remembers();
     // The way of a crack that turns hangs on the material, and what it cuts off would too: derivatives hold the way.

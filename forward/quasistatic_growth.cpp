@@ -83,12 +83,9 @@ Vec2 Quasistatic::next_tip(const GrowingTip& growing, const LoadState* state, in
     const GrowthDirection criterion = scene_.cracks[growing.crack].direction;
     const double way = 0.25 * quarters * growing.increment;
     const double cell = body_.layout.cell.maxCoeff();
-    TipLoad load = state->tips[2 * growing.crack + growing.at_end];
-    if (leg(line, growing.at_end) < (least_leg_in_cells(line, growing.at_end) - 1e-6) * cell) {
-        if (steered_by_intensities(criterion)) return tip.position + way * tip.direction;
-        if (std::isfinite(load.K_I)) load.K_I = 1.0, load.K_II = 0.0;
-    }
-    return tip.position + way * growth_direction(criterion, tip, load, materials_, std::max(growing.increment, cell));
+    const TipLoad& load = state->tips[2 * growing.crack + growing.at_end];
+    const bool may_turn = leg(line, growing.at_end) >= (least_leg_in_cells(line, growing.at_end) - 1e-6) * cell;
+    return tip.position + way * growth_direction(criterion, tip, load, materials_, std::max(growing.increment, cell), may_turn);
 }
 
 // The number of the last time of the loading, with a load, that `now` has passed: what tells whether a place has been due before.

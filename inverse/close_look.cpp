@@ -297,6 +297,9 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
         // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
         u.lower_95 = u.lower_95.cwiseMin(lower);
         u.upper_95 = u.upper_95.cwiseMax(upper);
+        const Eigen::VectorXd sd = u.covariance.diagonal().cwiseSqrt();
+        const Eigen::VectorXd wider = ((upper - lower) / (2 * u.quantile)).cwiseQuotient(sd).cwiseMax(1.0);
+        u.covariance = wider.asDiagonal() * u.covariance * wider.asDiagonal();
     } else {
         take_intervals(u, lower, upper);
     }

@@ -195,8 +195,10 @@ std::string scene_settings_text(const Study& study) {
     return text;
 }
 
+bool was_stopped(const Evaluation& evaluation) { return evaluation.status.ends_with("stopped by the user"); }
+
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation) {
-    if (evaluation.usable() || evaluation.status.ends_with("stopped by the user")) {
+    if (evaluation.usable() || was_stopped(evaluation)) {
         return "";
     }
     std::string text = fmt::format("a run failed: {}; to run it again:", evaluation.status);

@@ -61,6 +61,9 @@ std::string scene_settings_text(const Study& study);
 /// A word of a command line, in quotes where a shell would make something else of it.
 std::string quoted_for_shell(const std::string& word);
 
+/// Whether the user ended this run, which is no failure of its.
+bool was_stopped(const Evaluation& evaluation);
+
 /// Why an evaluation failed and the commands that run its scenes again with these values [parameters], SI; empty for one
 /// that did not fail, or that the user has stopped.
 std::string failure_text(const Study& study, const Eigen::VectorXd& values, const Evaluation& evaluation);

@@ -226,13 +226,15 @@ void fill_runs(const UnitBox& box, const std::vector<Run>& runs, Sensitivity& re
 
 // Failed runs and outputs that some runs do not have, counted.
 void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopped, Sensitivity& result) {
-    const auto failed = std::count_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
-    const auto good = static_cast<std::ptrdiff_t>(runs.size()) - failed;
+    const auto is_good = [](const Run& run) { return run.evaluation->usable(); };
+    const auto has_failed = [&](const Run& run) { return !is_good(run) && !was_stopped(*run.evaluation); };
+    const auto failed = std::ranges::count_if(runs, has_failed);
+    const auto good = std::ranges::count_if(runs, is_good);
     const bool told = std::ranges::any_of(result.indices, [](const SensitivityIndex& index) { return !std::isnan(index.value); });
     result.status = stopped ? SensitivityStatus::interrupted : told ? SensitivityStatus::finished : SensitivityStatus::failed;
     result.message = fmt::format("{} runs ended well", good) + result.message;
     if (failed > 0) {
-        const auto first = std::find_if(runs.begin(), runs.end(), [](const Run& run) { return !run.evaluation->usable(); });
+        const auto first = std::ranges::find_if(runs, has_failed);
         result.message +=
             fmt::format("; {} of {} runs failed and are left out; the first: {}", failed, runs.size(), first->evaluation->status);
     }

@@ -88,16 +88,19 @@ class Undetermined {
 };
 
 // What the data leave at the lowest point without priors, in standard deviations: what a prior pulls off the data is no lack of
-// fit.
+// fit. At the lowest point the data pull back as much as the priors pull, so that these alone tell how far it is.
 Eigen::VectorXd left_by_data(const Directions& directions, const Eigen::VectorXd& weights) {
-    const Eigen::Index data = weights.size();
+    const Eigen::Index data = weights.size(), priors = directions.slope.rows() - data;
     const Eigen::VectorXd& all = directions.best.evaluation->residuals;
     Eigen::VectorXd left = all.head(data);
-    if (all.size() > data) {
+    if (priors > 0) {
         const Eigen::MatrixXd slope = directions.slope.topRows(data);
-        const Eigen::VectorXd pulled =
-            slope.completeOrthogonalDecomposition().solve(directions.weight.head(data).cwiseProduct(left));
-        left -= directions.model.jacobian().topRows(data) * pulled;
+        const Eigen::VectorXd pull = directions.slope.bottomRows(priors).transpose() * all.tail(priors);
+        const Eigen::VectorXd way = (slope.transpose() * slope).completeOrthogonalDecomposition().solve(pull);
+        const Eigen::VectorXd there = left + directions.model.jacobian().topRows(data) * way;
+        if (there.squaredNorm() < left.squaredNorm()) {  // as where the slope holds so far
+            left = there;
+        }
     }
     return left.cwiseQuotient(weights.cwiseSqrt());
 }

@@ -490,6 +490,39 @@ TEST(UnitTransitionWood, FollowsTheDensity) {
     }
 }
 
+// --- Paths
+
+// Where a crack goes does not hang on the steps in which it grows, nor does it follow the grain unless it is driven to: wood off
+// its axes opens obliquely by K_I alone.
+TEST(VerificationOrthotropicPath, HangsNotOnTheAdvance) {
+    for (const double grain : {30.0, 60.0}) {
+        std::vector<double> heights;
+        for (const double advance : {2e-3, 1.0e-3, 0.6e-3, 0.0}) {
+            Scene scene = at_equilibrium(block({20e-3, 20e-3}, 0.5e-3));
+            scene.materials["EW"] = wood();
+            scene.specimen.radial = grain * degree;
+            scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+            scene.edges[0].velocity[0].reset();
+            scene.cracks = {Crack{}};
+            scene.cracks[0].points = {Vec2(0.0, 10.06e-3), Vec2(5e-3, 10.06e-3)};
+            scene.cracks[0].grows = Growth::end;
+            scene.cracks[0].advance = advance;
+            scene.measure = {"top", "top"};
+            scene.stop.displacement = 5e-3;
+            scene.stop.crack_length = 10e-3;
+            const std::vector<Vec2> path = simulate(scene).paths[0];
+            double height = 0.0;
+            for (std::size_t k = 1; k < path.size(); ++k)
+                if (path[k - 1].x() <= 9e-3 && path[k].x() > 9e-3)
+                    height = std::lerp(path[k - 1].y(), path[k].y(), (9e-3 - path[k - 1].x()) / (path[k].x() - path[k - 1].x()));
+            std::printf("grain at %.0f degrees, advance %.1f mm: 4 mm on, the crack is at y = %.3f mm\n", grain, 1e3 * advance,
+                        1e3 * height);
+            heights.push_back(height);
+        }
+        for (const double height : heights) EXPECT_NEAR(height, heights[0], 0.15e-3) << grain;
+    }
+}
+
 // --- Explicit dynamics
 
 TEST(SystemOrthotropicDynamics, KeepsItsEnergy) {
