@@ -109,6 +109,7 @@ class ExplicitSolver {
     TipPatch& patch_of(int crack, bool at_end);
     double softness_at(int crack, bool at_end, double way);
     double held_at(const Vec2& x) const;
+    double balanced_over(int crack, const CrackTip& tip) const;
     double toughness_to_overcome(int crack, bool at_end, double here);
     FineTip::Ahead finer_ahead(int crack, bool at_end, const TipPatch& patch, double gone);
     void note_speed(Tip& state, double way);

@@ -360,12 +360,12 @@ Vec2 MaterialMap::layer_normal(const Vec2& centre, const Vec2& half) const {
 }
 
 // Sixteen samples a side see the place of a boundary along the grid to 1/256 of the area's width (`place_of_sample`); a picture
-// is seen at twice its own resolution.
+// is seen at twice its own resolution, four at least: its borders may lie anywhere in a cell.
 int MaterialMap::samples_a_side(const Vec2& half) const {
     // One more sample than twice a whole number of pixels would put some of them on the edges of pixels.
     constexpr double rounding = 1e-6;
     const int fit = finest_ > 0.0 ? static_cast<int>(std::ceil(4.0 * half.maxCoeff() / finest_ - rounding)) : 16;
-    return std::clamp(fit, 2, 16);
+    return std::clamp(fit, 4, 16);
 }
 
 std::vector<double> MaterialMap::shares(const Vec2& middle, const Vec2& half) const {

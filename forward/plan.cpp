@@ -18,6 +18,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace crampfit {
 
@@ -187,6 +188,26 @@ bool wide_cells_see_voids(const Scene& scene, const MaterialMap& materials, cons
         if (!body.cell_is_full(c))
             return !thin_voids(scene, Discretisation(scene, materials, Layout::of(scene, 2.0 * body.layout.cell)));
     return true;
+}
+
+// Two sides that are pressed together must not meet.
+void check_edges(const Scene& scene, double end) {
+    if (!std::isfinite(end)) return;
+    const auto meet = [](const Edge& a, const Edge& b) {
+        return !a.range || !b.range || (a.range->first < b.range->second && b.range->first < a.range->second);
+    };
+    for (const auto& [low, high, axis] : {std::tuple(Side::left, Side::right, 0), std::tuple(Side::bottom, Side::top, 1)})
+        for (const Edge& a : scene.edges)
+            for (const Edge& b : scene.edges) {
+                if (a.side != low || b.side != high || !a.velocity[axis] || !b.velocity[axis] || !meet(a, b)) continue;
+                const auto way = [&](const Edge& edge) { return *edge.velocity[axis] * std::min(end, edge.until.value_or(end)); };
+                const double closer = way(a) - way(b);
+                if (closer < scene.specimen.size[axis]) continue;
+                const Edge& moves = std::abs(way(b)) >= std::abs(way(a)) ? b : a;
+                refuse(scene, "edges." + moves.name + ".velocity", fmt::format("{:g} m/s", *moves.velocity[axis]),
+                       fmt::format("in the end it would have come {:.3g} mm closer to the side across, which is {:.3g} mm away",
+                                   1e3 * closer, 1e3 * scene.specimen.size[axis]));
+            }
 }
 
 void check_cracks(const Scene& scene, const Discretisation& body) {
@@ -371,6 +392,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
                         !bridged && (plan.slowness > slow_loading || plan.free_bodies));
     check_solver(scene, plan.quasistatic, materials.orthotropic());
     check_bodies(scene, body);
+    check_edges(scene, plan.end_time);
     check_cracks(scene, body);
     for (const Edge& edge : scene.edges)
         if (edge.name == scene.measure.displacement && edge.traction && edge.traction->isZero(0.0))

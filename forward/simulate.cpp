@@ -195,7 +195,8 @@ void judge_advance(const Scene& scene, const Discretisation& body, Record& recor
         }
 }
 
-// A crack that goes out through a side is shown to end there: solvers let its tip go on a little.
+// A crack that goes out through a side is shown to end there, or to begin: solvers let its tip go on a little, and a scene may
+// draw it from outside.
 void end_at_sides(const Scene& scene, Record& record) {
     const Box box{Vec2::Zero(), scene.specimen.size};
     const auto outside = [&](const Vec2& x) { return (box.low - x).maxCoeff() > 0.0 || (x - box.high).maxCoeff() > 0.0; };
@@ -208,8 +209,8 @@ void end_at_sides(const Scene& scene, Record& record) {
     };
     for (int k = 0; k < static_cast<int>(scene.cracks.size()); ++k)
         for (const bool at_end : {false, true}) {
-            if (scene.cracks[k].grows != Growth::both && scene.cracks[k].grows != (at_end ? Growth::end : Growth::start))
-                continue;
+            const bool grows =
+                scene.cracks[k].grows == Growth::both || scene.cracks[k].grows == (at_end ? Growth::end : Growth::start);
             std::vector<Vec2>& path = record.paths[k];
             std::vector<Vec2> back = path;
             if (at_end) std::ranges::reverse(back);
@@ -217,7 +218,7 @@ void end_at_sides(const Scene& scene, Record& record) {
                 const Vec2 tip = way[0];
                 if (at_end) std::ranges::reverse(way);
                 path = way;
-                if (at_end != (scene.cracks[k].grows != Growth::start)) return;  // not the end that the tables show
+                if (!grows || at_end != (scene.cracks[k].grows != Growth::start)) return;  // not the end that the tables show
                 if (k == record.tracked_crack) {
                     for (Instant& row : record.series)
                         if (outside(row.tip)) row.tip = tip;

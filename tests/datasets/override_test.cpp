@@ -70,7 +70,7 @@ TEST(UnitOverride, ErrorsNameTheCommandLine) {
     expect_error("materials.EW.toughness", "-1 J/m^2", "greater than 0");
     expect_error("materials.EW.tougness", "1 J/m^2", "unknown key; did you mean \"toughness\"?");
     expect_error("materials", "{ EW = { E = \"1 MPa\" } }", "missing key", "materials.EW.nu", "(missing)");
-    expect_error("materials.XX.E", "1 MPa", "missing key", "materials.XX.nu", "(missing)");
+    expect_error("materials.XX.E", "1 MPa", "there is no materials.XX in scene.toml");
     expect_error("modell.cell", "1 mm", "unknown key; did you mean \"model\"?");
     expect_error("model", "3", "must be a table");
     expect_error("model.plane", "plain", "must be one of");

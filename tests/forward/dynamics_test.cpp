@@ -188,7 +188,7 @@ TEST(UnitPlan, RefusesWhatItCannotDo) {
             s.solver.shape_function = ShapeFunction::bspline2;
         },
         "solver.shape_function");
-    refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top");
+    refused([](Scene& s) { s.edges[0].range = {{2.1e-3, 2.2e-3}}; }, "edges.top.range");
     refused([](Scene& s) { s.model.cell = 1e-23; }, "model.cell");
     const auto crack = [](Scene& s, const Vec2& from, const Vec2& to) {
         Crack drawn;

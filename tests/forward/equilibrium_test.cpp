@@ -410,5 +410,27 @@ TEST(UnitEquilibrium, UnloadsAsItWasLoaded) {
     }
 }
 
+// A wall at a side of a block that is pressed from above: plane strain without strain across.
+TEST(VerificationGauges, AWallFeelsWhatItHolds) {
+    for (const bool moves : {true, false}) {  // the transducer; else what is measured stands, and feels a traction
+        Scene scene = at_equilibrium(block({8e-3, 10e-3}, 1e-3));
+        scene.model.plane = PlaneCondition::strain;
+        scene.materials["EW"] = {100e6, 0.3, 300.0, 100.0};
+        Edge top = without(moving("top", Side::top, {0.0, -1e-4}), 0);
+        if (!moves) {
+            top.velocity = {};
+            top.traction = Vec2(0.0, -1e5);
+        }
+        scene.edges = {top, without(moving("bottom", Side::bottom, {0.0, 0.0}), 0),
+                       without(moving("left", Side::left, {0.0, 0.0}), 1), without(moving("right", Side::right, {0.0, 0.0}), 1)};
+        const double stress = moves ? -100e6 * 0.7 / (1.3 * 0.4) * 1e-3 : -1e5;  // from above; 0.1 s at 1e-4 m/s, of 10 mm
+        scene.stop.time = 0.1;
+        scene.measure = {"right", moves ? "top" : "right"};
+        const Instant end = simulate(scene).series.back();
+        const double exact = 0.3 / 0.7 * stress * 10e-3 * scene.model.thickness;
+        EXPECT_NEAR(end.force / exact, 1.0, 1e-6) << moves;
+    }
+}
+
 }  // namespace
 }  // namespace crampfit::test

@@ -476,6 +476,34 @@ TEST(UnitWalk, APathEndsAtTheSideThatItGoesOutBy) {
     EXPECT_NEAR(record.series.back().crack_length, whole * way.norm(), 1e-9);
 }
 
+// It begins at the side, too, where the scene draws it from outside.
+TEST(UnitWalk, APathIsAsLongAsTheCrack) {
+    Scene scene = at_equilibrium(block({10e-3, 10e-3}, 0.5e-3));
+    scene.edges = {moving("top", Side::top, {0.0, 1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(12e-3, 5.5e-3), Vec2(7.5e-3, 5e-3)};
+    crack.grows = Growth::end;
+    scene.cracks = {crack};
+    scene.measure = {"top", "top"};
+    scene.stop.crack_length = 4e-3;
+    const Record record = simulate(scene);
+    double length = 0.0;
+    for (std::size_t k = 1; k < record.paths[0].size(); ++k) length += (record.paths[0][k] - record.paths[0][k - 1]).norm();
+    EXPECT_NEAR(length, record.series.back().crack_length, 1e-9);
+    EXPECT_NEAR(record.paths[0].front().x(), 10e-3, 1e-12);
+}
+
+// What is pressed beyond the side across, is refused before anything runs.
+TEST(UnitStop, SidesAreNotPressedThroughEachOther) {
+    Scene scene = at_equilibrium(block({4e-3, 4e-3}, 0.5e-3));
+    scene.edges = {moving("top", Side::top, {0.0, -1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};
+    scene.measure = {"top", "top"};
+    scene.stop.displacement = 3.9e-3;
+    EXPECT_NO_THROW(simulate(scene));
+    scene.stop.displacement = 5e-3;
+    EXPECT_THROW(simulate(scene), InputError);
+}
+
 TEST(UnitWalk, LoadGoesWithTheRootOfToughness) {
     // G goes with the square of the load at given crack length: all toughnesses times s, all critical loads times sqrt(s).
     Scene scene = rings_walk();

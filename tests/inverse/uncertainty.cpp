@@ -133,6 +133,34 @@ TEST(UnitUncertainty, AJumpAtOneStationHidesNoSlopeAtTheOthers) {
     EXPECT_NEAR(std::sqrt(found.covariance(0, 0) - found.model_variance[0]) * found.slope.col(0).head(count).norm(), 1, 0.05);
 }
 
+// Nor does a prior that says nothing make what stands beside a jump pass for lack of fit.
+TEST(UnitUncertainty, APriorThatSaysNothingWidensNothingBesideAJump) {
+    constexpr int count = 50;
+    const auto found = [](double prior) {
+        const auto evaluate = [prior](const Eigen::VectorXd& x, int) {
+            Evaluation evaluation;
+            evaluation.residuals = Eigen::VectorXd::Zero(count + 2);
+            for (int i = 0; i < count; ++i) {
+                evaluation.residuals[i] = 12.0 * i / count * (x[0] - 0.5) + std::cos(2.0 * i);
+            }
+            evaluation.residuals[count] = x.isConstant(0.5) ? 0.0 : 300 * scramble(x[0], x[1]);
+            evaluation.residuals[count + 1] = prior * (x[0] - 0.3);
+            evaluation.misfit = evaluation.residuals.squaredNorm();
+            return evaluation;
+        };
+        Objective objective(2, evaluate, 1000, 1);
+        objective.at(Eigen::VectorXd(Eigen::Vector2d(0.5, 0.5)));
+        return estimate_uncertainty(objective, {{count, 1}}, {"a", "b"}, difference_step, Window(2));
+    };
+    const Uncertainty without = found(0.0);
+    for (const double prior : {1e-9, 1e-6, 1e-3}) {
+        const Uncertainty with_it = found(prior);
+        EXPECT_NEAR(with_it.widening / without.widening, 1.0, 1e-3) << prior;
+        EXPECT_NEAR(with_it.covariance(0, 0) / without.covariance(0, 0), 1.0, 1e-3) << prior;
+    }
+    EXPECT_LT(without.widening, 1.5);
+}
+
 // Force rises with the toughness of earlywood and with the displacement. What rounding leaves of no effect, 1e-12 of the force,
 // must not be taken for one: the other errors are what they are without that parameter, but for one degree of freedom of 49,
 // which makes the misfit that widens them 2 % larger.
