@@ -205,7 +205,7 @@ TEST(VerificationAskew, InMotionACrackIsHardlyHeldBack) {
     }
 }
 
-// Sheared as well as opened (K_II 0.3 to 0.8 K_I), a tip waited until G was 1.2 to 1.4 times the toughness, on any grid. The
+// Sheared as well as opened (K_II 0.73 and 1.41 K_I), a tip waited until G was 1.2 to 1.4 times the toughness, on any grid. The
 // crack is drawn so slowly that it runs at rest: then equilibrium says when it has gone half a millimetre and how hard that was.
 TEST(VerificationAskew, InMotionShearDoesNotHoldACrackBack) {
     for (const double slope : {15.0, 30.0}) {

@@ -493,7 +493,7 @@ TEST(UnitWalk, APathIsAsLongAsTheCrack) {
     EXPECT_NEAR(record.paths[0].front().x(), 10e-3, 1e-12);
 }
 
-// What is pressed beyond the side across, is refused before anything runs.
+// What would be pressed beyond the side across is refused before anything runs.
 TEST(UnitStop, SidesAreNotPressedThroughEachOther) {
     Scene scene = at_equilibrium(block({4e-3, 4e-3}, 0.5e-3));
     scene.edges = {moving("top", Side::top, {0.0, -1e-5}), moving("bottom", Side::bottom, {0.0, 0.0})};

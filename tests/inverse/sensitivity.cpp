@@ -403,6 +403,28 @@ displacement = "1.2 mm"
     }
 }
 
+// A run that the user ends is none that failed.
+TEST(SystemSensitivity, RunsThatTheUserStoppedHaveNotFailed) {
+    const Study study = output_study(SensitivityMethod::sobol, 64);
+    std::atomic<bool> stop = false;
+    int runs = 0;
+    SensitivityOptions options;
+    options.stop_requested = &stop;
+    options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
+        Record record = FakeWedge{}(scene);
+        if (++runs == 3) {
+            stop = true;
+            record.status = RunStatus::interrupted;
+            record.message = "stopped by the user";
+        }
+        return record;
+    };
+    const Sensitivity result = study_sensitivity(study, options);
+    EXPECT_EQ(result.status, SensitivityStatus::interrupted);
+    EXPECT_NE(result.message.find("2 runs ended well"), std::string::npos) << result.message;
+    EXPECT_EQ(result.message.find("failed"), std::string::npos) << result.message;
+}
+
 TEST(SystemSensitivity, NoSobolIndicesOfAnOutputThatRunsLack) {
     // Runs of tough latewood end early.
     Study study = output_study(SensitivityMethod::sobol, 64);
