@@ -67,7 +67,8 @@ std::string field_figure(const Comparison& comparison) {
 
 /// An arrival is drawn the way that people draw it: crack length over the displacement of its arrival.
 std::string comparison_figure(const Comparison& comparison) {
-    const bool arrival = comparison.kind == "arrival", length = comparison.kind == "crack_length";
+    const bool arrival = comparison.kind == "arrival", length = comparison.kind == "crack_length",
+               by_length = comparison.kind == "force_at_length";
     const ScaledUnit millimetre{1e-3, "mm"};
     const std::vector<double> measured = column(comparison, &FitResidual::measured),
                               modelled = column(comparison, &FitResidual::modelled);
@@ -77,10 +78,11 @@ std::string comparison_figure(const Comparison& comparison) {
                                           ? scaled(column(comparison, &FitResidual::sigma), unit)
                                           : std::vector<double>{};
     Chart chart{.title = fmt::format("{}: {}", comparison.experiment,
-                                     arrival  ? "arrival of the crack"
-                                     : length ? "crack length"
-                                              : comparison.kind),
-                .x_label = "Displacement [mm]",
+                                     arrival     ? "arrival of the crack"
+                                     : length    ? "crack length"
+                                     : by_length ? "force at crack length"
+                                                 : comparison.kind),
+                .x_label = by_length ? "Crack length [mm]" : "Displacement [mm]",
                 .y_label = arrival || length ? "Crack length [mm]" : fmt::format("Force [{}]", unit.symbol)};
     ChartSeries data{.label = sigma.empty() ? "measured" : "measured, ± sigma", .colour = colour::black, .kind = Kind::points};
     ChartSeries model{.label = "fitted", .colour = colour::vermillion};
@@ -94,15 +96,17 @@ std::string comparison_figure(const Comparison& comparison) {
 }
 
 std::string residuals_figure(const Comparison& comparison) {
-    const bool arrival = comparison.kind == "arrival";
+    const bool by_length = comparison.kind == "arrival" || comparison.kind == "force_at_length";
     const bool field = is_field(comparison);
     const std::vector<double> at = scaled(column(comparison, field ? &FitResidual::modelled : &FitResidual::at), {1e-3, "mm"});
     return draw(
         {.title = fmt::format("{}: residuals of {}", comparison.experiment,
-                              comparison.kind == "crack_length" ? "crack length" : comparison.kind),
-         .x_label = arrival ? "Crack length [mm]"
-                    : field ? "Displacement of the point, fitted [mm]"
-                            : "Displacement [mm]",
+                              comparison.kind == "crack_length"      ? "crack length"
+                              : comparison.kind == "force_at_length" ? "force at crack length"
+                                                                     : comparison.kind),
+         .x_label = by_length ? "Crack length [mm]"
+                    : field   ? "Displacement of the point, fitted [mm]"
+                              : "Displacement [mm]",
          .y_label = "(fitted − measured) / sigma [–]",
          .series = {{.colour = colour::blue, .kind = Kind::points, .x = at, .y = column(comparison, &FitResidual::residual)}},
          .y_levels = {-2, 0, 2}});

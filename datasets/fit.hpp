@@ -41,8 +41,9 @@ struct FitRun {
 /// One data point of one experiment against the model at the best parameters.
 struct FitResidual {
     std::string experiment;
-    std::string kind;     // "force", "break", "arrival", "crack_length", or a component of a displacement field, "u_x" or "u_y"
-    double at = 0;        // displacement [m] or time [s]; crack length [m] for arrival
+    std::string kind;     // "force", "force_at_length", "break", "arrival", "crack_length", or a component of a displacement
+                          // field, "u_x" or "u_y"
+    double at = 0;        // displacement [m] or time [s]; crack length [m] for arrival and force_at_length
     double measured = 0;  // SI
     double modelled = 0;  // SI
     double sigma = 0;     // SI

@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "inverse/curve.hpp"
+#include "inverse/force_path.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -311,6 +312,11 @@ double Comparison::sigma(std::size_t station, double model_resolution) const {
     if (one.kind == "arrival" || one.kind == "break") {
         return std::hypot(of_data[0], model_resolution * one.measured) * std::sqrt(together);
     }
+    if (one.kind == "force_at_length") {
+        return Eigen::Vector3d(of_data[0], model_resolution * peak_force_,
+                               model_resolution * longest_length_ * force_noise_ / length_noise_)
+            .norm();
+    }
     const bool is_force = one.kind == "force";
     const double of_place = place_error(is_force ? *forces_ : *lengths_, one.at, half, model_resolution * one.at);
     const double of_value = model_resolution * (is_force ? peak_force_ : longest_length_);
@@ -331,12 +337,14 @@ void Comparison::know_to(double model_resolution) {
 
 void Comparison::add_curves(const Experiment& experiment) {
     const Curves& data = experiment.data;
-    by_time_ = !measured(data.displacement);
-    if (by_time_ && !measured(data.time)) {
-        throw bad_data(experiment, "displacement", "absent", "a displacement or a time column is needed to compare a model with");
-    }
     if (!measured(data.force) && !measured(data.crack_length)) {
         throw bad_data(experiment, "force", "absent", "a force or a crack_length column is needed to compare a model with");
+    }
+    by_time_ = !measured(data.displacement);
+    by_length_ = by_time_ && !measured(data.time);
+    if (by_length_) {
+        add_path_stations(experiment);
+        return;
     }
     abscissa_ = by_time_ ? data.time : data.displacement;
     const auto& materials = experiment.scene.materials;
@@ -489,6 +497,45 @@ void Comparison::add_break(const Experiment& experiment, const Curve& rows, doub
     errors_.push_back({{std::hypot(apart / std::sqrt(12.0), of_force, abscissa_noise_), 0, 0}});
 }
 
+// Rows stand by their number: nothing else orders them.
+void Comparison::add_path_stations(const Experiment& experiment) {
+    const Curves& data = experiment.data;
+    if (!measured(data.force) || !measured(data.crack_length)) {
+        throw bad_data(experiment, "displacement", "absent",
+                       "a displacement or a time column, or force and crack_length both, are needed to compare a model with");
+    }
+    std::vector<double> number, force, length;
+    for (std::size_t i = 0; i < data.force.size(); ++i) {
+        if (!std::isnan(data.force[i]) && !std::isnan(data.crack_length[i])) {
+            number.push_back(static_cast<double>(number.size()));
+            force.push_back(data.force[i]);
+            length.push_back(data.crack_length[i]);
+        }
+    }
+    if (number.empty()) {
+        throw bad_data(experiment, "crack_length", "absent", "no row has both a force and a crack length");
+    }
+    const Curve& forces = forces_.emplace(number, force);
+    const Curve& lengths = lengths_.emplace(number, length);
+    force_noise_ = noise_of(experiment, "force", forces, experiment.noise.force);
+    length_noise_ = noise_of(experiment, "crack_length", lengths, experiment.noise.crack_length);
+    peak_force_ = largest(forces);
+    longest_length_ = largest(lengths);
+    const std::size_t most = (number.size() + most_rows - 1) / most_rows;  // that are averaged
+    for (std::size_t from = 0, to = 0; from < number.size(); from = to) {
+        to = std::min(from + most, number.size());
+        const auto count = static_cast<double>(to - from);
+        const auto mean = [&](const std::vector<double>& values) {
+            return std::accumulate(values.begin() + static_cast<std::ptrdiff_t>(from),
+                                   values.begin() + static_cast<std::ptrdiff_t>(to), 0.0) /
+                   count;
+        };
+        stations_.push_back(
+            {.experiment = experiment.name, .kind = "force_at_length", .at = mean(length), .measured = mean(force)});
+        errors_.push_back({{force_noise_ / std::sqrt(count), 0, 0}});
+    }
+}
+
 void Comparison::add_crack_stations(const Experiment& experiment) {
     Curve& rows = lengths_.emplace(abscissa_, experiment.data.crack_length);
     const double noise = noise_of(experiment, "crack_length", rows, experiment.noise.crack_length);
@@ -622,7 +669,36 @@ Eigen::VectorXd Comparison::modelled(const Record& record, double slack_force) c
     return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+std::vector<double> Comparison::on_path(const Record& record, double slack_force) const {
+    std::vector<double> times, forces, lengths;
+    for (const Instant& instant : record.series) {
+        times.push_back(instant.time);
+        forces.push_back(instant.force);
+        lengths.push_back(instant.crack_length);
+    }
+    if (record.driving.empty()) {  // in motion forces swing; a jump of both stays on the line between its ends
+        for (std::vector<double>* column : {&forces, &lengths}) {
+            const Curve smooth = Curve(times, *column).smoothed(smoothing_window * (times.back() - times.front()));
+            std::ranges::transform(times, column->begin(), [&](double time) { return smooth.at(time); });
+        }
+    }
+    if (record.status == RunStatus::split) {
+        forces.push_back(slack_force);
+        lengths.push_back(lengths.back());
+    }
+    const ForcePath path(lengths, forces, length_noise_, force_noise_);
+    std::vector<double> values;
+    for (std::size_t i = 0; i < errors_.size(); ++i) {
+        const FitResidual& station = stations_[i];
+        values.push_back(station.measured + force_noise_ * path.distance(station.at, station.measured));
+    }
+    return values;
+}
+
 std::vector<double> Comparison::on_curves(const Record& record, double slack_force) const {
+    if (by_length_) {
+        return on_path(record, slack_force);
+    }
     std::vector<double> abscissa, forces, lengths;
     for (const Instant& instant : record.series) {
         abscissa.push_back(by_time_ ? instant.time : instant.displacement);

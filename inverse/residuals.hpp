@@ -43,12 +43,17 @@ namespace crampfit {
 /// them, or single rows, so that every row counts once, also where the crack stands or grows by less than noise, which says
 /// little of when.
 ///
+/// Force at lengths: where rows have neither a displacement nor a time, how far each is from the force over crack length that the
+/// model goes through (ForcePath); `modelled` is off `measured` by as many standard deviations of the force. Of many rows those
+/// that follow each other are averaged, so that no more than `most_rows` are left.
+///
 /// Force is compared where data exist. After the end of a Record the force is that of a slack machine if the specimen
 /// split, else the last one.
 class Comparison {
   public:
     static constexpr double smoothing_window = 0.02;  // of the measured range
     static constexpr int most_arrivals = 200;
+    static constexpr int most_rows = 200;
 
     /// `model_resolution`: how well the model knows what it says, as a part of the displacement (time) to which it places an
     /// event, of the peak force that its vibration moves and of the longest crack. These count as errors beside the noise of the
@@ -83,6 +88,8 @@ class Comparison {
     void add_crack_stations(const Experiment& experiment);
     void add_arrival_stations(const Experiment& experiment, const Curve& rows, double noise);
     void add_length_stations(const Experiment& experiment, const Curve& rows, double noise);
+    void add_path_stations(const Experiment& experiment);
+    std::vector<double> on_path(const Record& record, double slack_force) const;
     void tell_of_hold(const Experiment& experiment);
     void tell_of_spikes(const Experiment& experiment, const Curve& rows);
     void count_hold(Curve& rows) const;
@@ -97,6 +104,7 @@ class Comparison {
     };
 
     std::optional<double> longest_;  // crack, that ends runs [m]
+    bool by_length_ = false;         // no time or displacement: rows are force at crack length
     bool by_time_ = false;           // stations stand on time [s] instead of displacement [m]
     bool may_relax_ = false;         // forces while displacement stands
     std::vector<double> abscissa_;   // measured displacement [m] or time [s], a row
@@ -108,6 +116,7 @@ class Comparison {
     std::vector<std::pair<double, double>> length_tiles_;  // the same of crack length
     std::optional<Curve> forces_, lengths_;                // the rows [N], [m]
     double peak_force_ = 0, longest_length_ = 0;           // of them
+    double force_noise_ = 0, length_noise_ = 0;            // of a row by length [N], [m]
     std::optional<FieldComparison> fields_;
     std::vector<FitResidual> stations_;  // of the curves, then of the fields
     std::vector<Errors> errors_;         // of the curves' stations

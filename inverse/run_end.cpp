@@ -152,6 +152,40 @@ double cut_at_crack_length(const Experiment& test, const std::vector<double>& ab
     return beyond;
 }
 
+// The same of rows that have neither a displacement nor a time.
+void cut_longer_rows(const Experiment& test, CoveredData& covered) {
+    Curves& data = covered.curves;
+    if (!test.scene.stop.crack_length || data.force.empty()) {
+        return;
+    }
+    const double end = *test.scene.stop.crack_length;
+    double shortest = unbounded, longest = 0;
+    std::size_t left_out = 0;
+    for (std::size_t i = 0; i < data.crack_length.size(); ++i) {
+        const double length = data.crack_length[i];
+        if (std::isnan(length) || std::isnan(data.force[i])) {
+            continue;
+        }
+        shortest = std::min(shortest, length);
+        longest = std::max(longest, length);
+        if (length > end * (1 + rounding)) {
+            data.crack_length[i] = data.force[i] = std::nan("");
+            ++left_out;
+        }
+    }
+    const std::string stop_text = fmt::format("{:g} mm", 1e3 * end);
+    if (shortest > end && left_out > 0) {
+        throw InputError(file_of(test), "stop.crack_length", stop_text,
+                         fmt::format("ends each run before the data begin, whose crack is {:g} mm long or more", 1e3 * shortest));
+    }
+    if (left_out > 0) {
+        covered.remark = fmt::format(
+            "{}: stop.crack_length = {} ends the runs before the data, whose crack grows to {:.4g} mm: {} rows with a longer "
+            "crack are left out; a later stop would take them in.",
+            test.name, stop_text, 1e3 * longest, left_out);
+    }
+}
+
 std::string data_file_of(const Experiment& test) {
     return test.data_file.empty() ? "data of " + test.name : test.data_file.string();
 }
@@ -388,6 +422,8 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     if (is_measured(abscissa)) {
         cut_rows(test, abscissa, by_time, machine, covered);
         grown = cut_at_crack_length(test, abscissa, by_time, covered);
+    } else if (is_measured(test.data.crack_length)) {
+        cut_longer_rows(test, covered);
     }
     if (covered.fields) {
         const bool as_pictures = by_time != covered.fields->by_displacement;

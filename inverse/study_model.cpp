@@ -191,7 +191,7 @@ MeasuredCurves StudyModel::curves() const {
     MeasuredCurves curves;
     for (std::size_t i = 0; i < comparisons_.size(); ++i) {
         const std::vector<FitResidual>& stations = comparisons_[i].stations();
-        for (const char* kind : {"force", "break", "arrival", "crack_length", "u_x", "u_y"}) {
+        for (const char* kind : {"force", "force_at_length", "break", "arrival", "crack_length", "u_x", "u_y"}) {
             const auto count = std::count_if(stations.begin(), stations.end(),
                                              [kind](const FitResidual& station) { return station.kind == kind; });
             if (count > 0) {

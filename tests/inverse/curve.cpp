@@ -1,4 +1,5 @@
 #include "inverse/curve.hpp"
+#include "inverse/force_path.hpp"
 
 #include <gtest/gtest.h>
 
@@ -107,6 +108,22 @@ TEST(UnitCurve, ARowFarOffHardlyMovesAnArrival) {
         noisy[far_off] = 1.5;
         EXPECT_NEAR(*Curve(x, noisy).arrival(1.0), exact, 1.0);
     }
+}
+
+// Up at 2, with a tooth: 10 N at 2, down to 4 N at 5, up to 7 N there. Noise: 1 N, and 0.5 of a length.
+TEST(UnitForcePath, IsAsFarFromARowAsItsNearestPoint) {
+    const crampfit::ForcePath path({2, 2, 2, 5, 5}, {0, 5, 10, 4, 7}, 0.5, 1);
+    EXPECT_NEAR(path.distance(2, 3), 0, 1e-15);  // on the way up
+    EXPECT_DOUBLE_EQ(path.distance(2.25, 3), 0.5);
+    EXPECT_DOUBLE_EQ(path.distance(1.5, 3), -1);
+    EXPECT_DOUBLE_EQ(path.distance(2, 12), -2);  // above the tooth, which is a corner of less than a right angle
+    EXPECT_DOUBLE_EQ(path.distance(1.9, 12), -std::hypot(0.2, 2));
+    // From (4, 10) to (10, 4), in noise: a row 3 below it at (7, 4).
+    EXPECT_DOUBLE_EQ(path.distance(3.5, 4), 3 / std::sqrt(2));
+    EXPECT_DOUBLE_EQ(path.distance(3.5, 10), -3 / std::sqrt(2));
+    EXPECT_DOUBLE_EQ(path.distance(5.5, 4), 1);                    // beside the next tooth
+    EXPECT_DOUBLE_EQ(path.distance(4.9, 9), -std::hypot(0.2, 2));  // beyond its end
+    EXPECT_DOUBLE_EQ(crampfit::ForcePath({2, 2}, {3, 3}, 0.5, 1).distance(2, 5), 2);
 }
 
 }  // namespace

@@ -146,6 +146,57 @@ TEST(SystemFit, DataOfALongerCrackThanRunsGoToDoNotBias) {
     EXPECT_THROW(fit_study(study, options), InputError);
 }
 
+// How hard it was to drive the crack at each length: in any order, with jumps and without.
+TEST(SystemFit, ForceAtCrackLengthsIsEnough) {
+    for (const double sharpness : {1.0, 2.0}) {
+        for (const unsigned seed : {1u, 2u}) {
+            FakeWedge wedge;
+            wedge.sharpness = sharpness;
+            Study study = wedge_study(wedge, 0.02, 1e-4, seed);
+            Curves& data = study.experiments[0].data;
+            data.displacement.clear();
+            data.time.clear();
+            FitOptions options = with(wedge);
+            options.forward = [run = options.forward](const Scene& scene, const std::atomic<bool>* stop) {
+                Record record = run(scene, stop);
+                record.driving.emplace_back();  // at equilibrium nothing is averaged
+                return record;
+            };
+            const Fit fit = fit_study(study, options);
+            std::reverse(data.force.begin(), data.force.end());
+            std::reverse(data.crack_length.begin(), data.crack_length.end());
+            const Fit reversed = fit_study(study, options);
+            EXPECT_EQ(fit.status, FitStatus::converged);
+            EXPECT_EQ(fit.message.find("Lack of fit"), std::string::npos) << fit.message;
+            EXPECT_LE(fit.residuals.size(), 200u);
+            for (std::size_t j = 0; j < 2; ++j) {
+                const double truth = j == 0 ? true_earlywood : true_latewood;
+                EXPECT_LT(std::abs(fit.parameters[j].value - truth), 3 * fit.parameters[j].standard_error);
+                EXPECT_LT(fit.parameters[j].standard_error, 0.05 * truth);
+                EXPECT_NEAR(reversed.parameters[j].value, fit.parameters[j].value, 0.5 * fit.parameters[j].standard_error);
+            }
+        }
+    }
+}
+
+TEST(SystemFit, ForceAtLengthsBeyondTheEndOfTheRunsIsLeftOut) {
+    Study study = wedge_study(FakeWedge(), 0.02, 1e-4);
+    Experiment& experiment = study.experiments[0];
+    experiment.data.displacement.clear();
+    experiment.data.time.clear();
+    experiment.scene.stop.crack_length = 5e-3;
+    const CoveredData covered = covered_data(study, 0);
+    EXPECT_NE(covered.remark.find("wedge: stop.crack_length = 5 mm ends the runs before the data"), std::string::npos);
+    for (std::size_t i = 0; i < experiment.data.force.size(); ++i) {
+        EXPECT_EQ(std::isnan(covered.curves.force[i]), experiment.data.crack_length[i] > 5e-3);
+    }
+    experiment.scene.stop.crack_length = 1e-3;
+    EXPECT_THROW(covered_data(study, 0), InputError);
+    experiment.data.force.clear();
+    experiment.scene.stop.crack_length = 5e-3;
+    EXPECT_THROW(fit_study(study, with(FakeWedge())), InputError);  // lengths alone
+}
+
 TEST(SystemFit, WhatTheMachineTakesOfTheDisplacementDoesNotEndTheRunsEarlier) {
     FakeWedge wedge;
     Study study = wedge_study(wedge, 0.02, 1e-4);

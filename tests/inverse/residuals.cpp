@@ -701,6 +701,7 @@ TEST(UnitResiduals, RefusesDataThatCannotBeCompared) {
     Experiment bad = experiment;
     bad.data.displacement.clear();
     bad.data.time.clear();
+    bad.data.force.clear();
     expect_refused(bad, "displacement");
     bad = experiment;
     bad.data.force.clear();
