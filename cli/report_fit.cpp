@@ -91,7 +91,8 @@ std::string comparison_figure(const Comparison& comparison) {
     (arrival ? data.x_error : data.y_error) = sigma;
     model.x = arrival ? scaled(modelled, unit) : at;
     model.y = arrival ? at : scaled(modelled, unit);
-    chart.series = {data, model};
+    chart.series = {data};
+    if (!by_length) chart.series.push_back(model);  // many forces at one length: the residuals tell
     return draw(chart);
 }
 

@@ -106,10 +106,19 @@ class NumberFinder {
                 fail(": the specimen has no rings");
             }
             const Rings& rings = *scene_.specimen.rings;
+            if (part(2) == "pith") {
+                return component(rings.pith, limits::coordinate, 3);
+            }
             return member({{"period", {&rings.period, limits::period}},
                            {"latewood_fraction", {&rings.latewood_fraction, limits::latewood_fraction}},
                            {"transition", {&rings.transition, limits::transition}}},
                           2);
+        }
+        if (part(1) == "pith") {
+            if (!scene_.specimen.pith) {
+                fail(": the specimen has no pith of its own");
+            }
+            return component(*scene_.specimen.pith, limits::coordinate, 2);
         }
         if (part(1) == "density_exponents") {
             return member(exponent_numbers(scene_.specimen.density_exponents), 2);
@@ -120,10 +129,13 @@ class NumberFinder {
             }
             return member({{"radial", {&*scene_.specimen.radial, limits::rotation}}}, 1);
         }
-        if (part(1) == "rotation" && !scene_.specimen.picture && scene_.specimen.file.empty()) {
+        const SpecimenPlan& plan = scene_.specimen;
+        if ((part(1) == "rotation" || part(1) == "offset") && !plan.picture && plan.file.empty()) {
             fail(": the specimen has neither image nor file");
         }
-        const SpecimenPlan& plan = scene_.specimen;
+        if (part(1) == "offset") {
+            return component(plan.picture ? plan.picture->offset : plan.file_offset, limits::coordinate, 2);
+        }
         return member({{"rotation", {plan.picture ? &plan.picture->rotation : &plan.file_rotation, limits::rotation}}}, 1);
     }
 
@@ -158,6 +170,11 @@ class NumberFinder {
         return list[number];
     }
 
+    /// Number 0 or 1 of a vector, the last part of the key, number `at`.
+    SceneNumber component(const Vec2& vector, const NumberRule& rule, std::size_t at) const {
+        return member({{"0", {&vector.x(), rule}}, {"1", {&vector.y(), rule}}}, at);
+    }
+
     /// Number 0 or 1 of a velocity, the last part of the key.
     SceneNumber velocity(const double* x, const double* y) const {
         if (part(2) != "velocity") {
@@ -171,7 +188,11 @@ class NumberFinder {
     }
 
     SceneNumber in_edge() const {
-        const auto& [x, y] = named(scene_.edges).velocity;
+        const Edge& edge = named(scene_.edges);
+        if (edge.traction && part(2) == "traction") {
+            return component(*edge.traction, limits::traction, 3);
+        }
+        const auto& [x, y] = edge.velocity;
         return velocity(x ? &*x : nullptr, y ? &*y : nullptr);
     }
 

@@ -99,6 +99,7 @@ TEST(UnitOverride, NumbersOfAScene) {
                                      {"specimen.rings.period", 4e-3},
                                      {"specimen.rings.latewood_fraction", 0.5},
                                      {"specimen.rings.transition", 1e-3},
+                                     {"specimen.rings.pith.1", -4e-3},
                                      {"cracks.1.advance", 1e-3},
                                      {"solver.damping", 3.0},
                                      {"edges.grip.velocity.1", 9.0},
@@ -115,6 +116,7 @@ TEST(UnitOverride, NumbersOfAScene) {
     EXPECT_EQ(scene.specimen.rings->period, 4e-3);
     EXPECT_EQ(scene.specimen.rings->latewood_fraction, 0.5);
     EXPECT_EQ(scene.specimen.rings->transition, 1e-3);
+    EXPECT_EQ(scene.specimen.rings->pith.y(), -4e-3);
     EXPECT_EQ(scene.cracks[1].advance, 1e-3);
     EXPECT_EQ(scene.solver.damping, 3);
     EXPECT_EQ(*scene.edges[0].velocity[1], 9);
@@ -140,6 +142,10 @@ TEST(UnitOverride, NumbersThatCannotBe) {
         {"edges.roof.velocity.0", 1, "there is no \"roof\" in edges"},
         {"edges.grip.velocity.2", 1, "no number"},
         {"edges.grip.until", 1, "no number"},
+        {"edges.grip.traction.1", 1, "no number"},
+        {"specimen.rings.pith.2", 1, "no number"},
+        {"specimen.pith.0", 1, "no pith of its own"},
+        {"specimen.offset.0", 1, "neither image nor file"},
         {"cracks.2.advance", 1, "there is no crack 2"},
         {"specimen.rotation", 1, "neither image nor file"},
         {"title", 1, "no number"},

@@ -89,6 +89,7 @@ TEST(UnitScene, RingsBodiesAndCracks) {
     EXPECT_EQ(scene.edges[1].name, "left");
     EXPECT_EQ(scene.edges[1].side, Side::left);
     EXPECT_DOUBLE_EQ(scene.edges[1].traction->y(), 1e6);
+    EXPECT_DOUBLE_EQ(get_number(scene, "edges.left.traction.1"), 1e6);
     ASSERT_EQ(scene.bodies.size(), 2U);
     EXPECT_EQ(scene.bodies[0].contact.kind, Contact::Kind::friction);
     EXPECT_DOUBLE_EQ(scene.bodies[0].contact.coefficient, 0.3);
@@ -126,6 +127,7 @@ TEST(UnitScene, Picture) {
     EXPECT_EQ(picture.orientation, folder / "angles.png");
     EXPECT_DOUBLE_EQ(picture.pixel, 25e-6);
     EXPECT_DOUBLE_EQ(picture.offset.x(), -1e-3);
+    EXPECT_DOUBLE_EQ(get_number(scene, "specimen.offset.0"), -1e-3);
     EXPECT_DOUBLE_EQ(picture.rotation, std::numbers::pi / 6);
     EXPECT_TRUE(picture.graded);
     ASSERT_EQ(picture.classes.size(), 2U);
@@ -140,6 +142,7 @@ TEST(UnitScene, SpecimenFile) {
     const Scene scene = folder.parse(text);
     EXPECT_EQ(scene.specimen.file, folder / "specimen.h5");
     EXPECT_DOUBLE_EQ(scene.specimen.file_offset.x(), 1e-3);
+    EXPECT_DOUBLE_EQ(get_number(scene, "specimen.offset.0"), 1e-3);
     EXPECT_DOUBLE_EQ(scene.specimen.file_rotation, 1);
     EXPECT_DOUBLE_EQ(get_number(scene, "specimen.rotation"), 1);
 }
