@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -62,18 +63,21 @@ Solution descend(Objective& objective, const Eigen::VectorXd& start, const Metho
     return solution;
 }
 
-double reduced_chi_square(const Evaluation& evaluation, Eigen::Index parameters) {
-    return evaluation.misfit / static_cast<double>(std::max<Eigen::Index>(1, evaluation.residuals.size() - parameters));
+// Residuals beyond the parameters that fit them, at least one.
+double freedom(const Evaluation& evaluation, Eigen::Index parameters) {
+    return static_cast<double>(std::max<Eigen::Index>(1, evaluation.residuals.size() - parameters));
 }
 
-// The lowest of the runs that no descent has started from or ended at yet; absent if there is none.
-std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const std::vector<Eigen::VectorXd>& seen) {
-    constexpr double far = 0.2;  // of the box
+// The lowest of the runs that no descent has started from or ended at yet, where its misfit is no more than `most`; absent if
+// there is none.
+std::optional<Eigen::VectorXd> next_start(const std::vector<Run>& starts, const std::vector<Eigen::VectorXd>& seen, double most) {
+    constexpr double far = 0.1;  // of the box
     const Run* next = nullptr;
     for (const Run& run : starts) {
         const bool is_new = std::none_of(seen.begin(), seen.end(),
                                          [&](const Eigen::VectorXd& x) { return (x - run.x).cwiseAbs().maxCoeff() < far; });
-        if (is_new && run.evaluation->usable() && (!next || run.evaluation->misfit < next->evaluation->misfit)) {
+        if (is_new && run.evaluation->usable() && run.evaluation->misfit <= most &&
+            (!next || run.evaluation->misfit < next->evaluation->misfit)) {
             next = &run;
         }
     }
@@ -95,8 +99,9 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
     std::vector<Eigen::VectorXd> seen;
     stage("descent");
     int descents = starts;
+    double most = std::numeric_limits<double>::infinity();
     for (int i = 0; i < descents && !objective.exhausted(); ++i) {
-        const auto start = next_start(tried, seen);
+        const auto start = next_start(tried, seen, most);
         if (!start) {
             break;
         }
@@ -114,11 +119,11 @@ SearchResult search_automatically(Objective& objective, int starts, const Eigen:
         }
         ends += fmt::format(" Descent {}: {}.", i + 1, solution.message);
         const Evaluation& best = *objective.best()->evaluation;
-        const double left = reduced_chi_square(best, p);
+        const double left = best.misfit / freedom(best, p);
         const bool looks_like_noise = is_explained(best);
-        if (solution.converged && left < explained && looks_like_noise) {
-            break;
-        }
+        // Only a start that the noise explains as it stands may lead to another explanation then.
+        const bool is_one = solution.converged && left < explained && looks_like_noise;
+        most = is_one ? explained * freedom(best, p) : most;
         // Others have not come to their ends: one of them may go lower.
         if (!solution.converged && left > unexplained) {
             result.converged = false;
