@@ -87,7 +87,7 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
         model.set_budget_left(1000 * static_cast<int>(model.parameters()) + runs_for_a_sample * choice.posterior);
         const auto log_likelihood = [&](const Evaluation& evaluation) {
             const Eigen::VectorXd& r = evaluation.residuals;
-            const double of_priors = r.tail(r.size() - data_residuals).squaredNorm();
+            const double of_priors = r.tail(r.size() - data_residuals).squaredNorm() / uncertainty.prior_weight;
             return -0.5 * (r.head(data_residuals).squaredNorm() / uncertainty.temperature + of_priors);
         };
         const Eigen::MatrixXd inverse = window.axes.inverse();

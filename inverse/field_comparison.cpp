@@ -14,6 +14,8 @@
 namespace crampfit {
 namespace {
 
+constexpr double of_one_picture = 0.5;  // of a displacement's variance, which is that of two
+
 // A small motion of the whole picture: a translation, and a turn about the origin.
 Eigen::MatrixXd motion_at(const Vec2& place) {
     Eigen::MatrixXd rows(2, 3);
@@ -33,7 +35,7 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
         std::vector<Point>& points = pictures_.emplace_back();
         for (std::size_t i = 0; i < places_.size(); ++i) {
             if (fields.moved[k][i].allFinite()) {
-                points.push_back({i, fields.moved[k][i], experiment.noise.displacement_field.value_or(fields.sigma[k][i])});
+                points.push_back({i, fields.moved[k][i], experiment.noise.displacement_field.value_or(fields.sigma[k][i]), 0.0});
                 if (!(points.back().sigma > 0)) {
                     throw InputError(fields.file.string(), fmt::format("sigma of image {}", k),
                                      fmt::format("{:g}", points.back().sigma), "must be positive: give noise.displacement_field");
@@ -47,12 +49,20 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
         followed += points.size();
         compared += !points.empty();
     }
+    std::vector<ReferenceError> reference(places_.size());
+    for (std::vector<Point>& points : pictures_) {
+        for (Point& point : points) {
+            ReferenceError& error = reference[point.place];
+            point.unforeseen = std::sqrt(error.variance(point.sigma) + of_one_picture * point.sigma * point.sigma);
+            error.take_in(Vec2::Zero(), point);
+        }
+    }
     for (int axis = 0; axis < 2; ++axis) {
         for (std::size_t k = 0; k < pictures_.size(); ++k) {
             for (const Point& point : pictures_[k]) {
                 FitResidual station{.experiment = experiment.name, .kind = axis == 0 ? "u_x" : "u_y", .at = fields.instants[k]};
                 station.measured = point.measured[axis];
-                station.sigma = point.sigma;
+                station.sigma = point.unforeseen;
                 stations_.push_back(station);
             }
         }
@@ -62,7 +72,22 @@ FieldComparison::FieldComparison(const Experiment& experiment) {
                           camera_moves_ ? "; each picture may have moved and turned as a whole" : "");
 }
 
-std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, const ProbeReading& reading) const {
+// Nothing is known beforehand but that the reference has half of the first variance; a picture that is the reference itself tells
+// nothing of its noise.
+void FieldComparison::ReferenceError::take_in(const Vec2& off, const Point& point) {
+    if (!point.measured.isZero(0.0)) {
+        const double weight = 1 / (of_one_picture * point.sigma * point.sigma);
+        precision += precision > 0 ? weight : 2 * weight;
+        sum += weight * off;
+    }
+}
+
+double FieldComparison::ReferenceError::variance(double sigma) const {
+    return precision > 0 ? 1 / precision : of_one_picture * sigma * sigma;
+}
+
+std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, const ProbeReading& reading,
+                                            std::vector<ReferenceError>& reference) const {
     std::vector<Vec2> values;
     std::vector<double> share;  // of a point that counts
     for (const Point& point : points) {
@@ -78,7 +103,12 @@ std::vector<Vec2> FieldComparison::modelled(const std::vector<Point>& points, co
         move_with_camera(points, share, values);
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
-        values[i] = points[i].measured + share[i] * (values[i] - points[i].measured);
+        ReferenceError& error = reference[points[i].place];
+        const Vec2 off = values[i] - points[i].measured;
+        values[i] = points[i].measured + share[i] * (off - error.mean());
+        if (share[i] == 1.0) {
+            error.take_in(off, points[i]);
+        }
     }
     return values;
 }
@@ -106,8 +136,9 @@ std::vector<double> FieldComparison::modelled(const Record& record) const {
             fmt::format("the run read {} of {} displacement fields", record.probes.size(), pictures_.size()));
     }
     std::vector<Vec2> values;
+    std::vector<ReferenceError> reference(places_.size());
     for (std::size_t k = 0; k < pictures_.size(); ++k) {
-        const std::vector<Vec2> of_picture = modelled(pictures_[k], record.probes[k]);
+        const std::vector<Vec2> of_picture = modelled(pictures_[k], record.probes[k], reference);
         values.insert(values.end(), of_picture.begin(), of_picture.end());
     }
     std::vector<double> all;

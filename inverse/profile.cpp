@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <vector>
 
 namespace crampfit {
 namespace {
@@ -30,9 +32,25 @@ Eigen::VectorXd with(const Eigen::VectorXd& others, Eigen::Index j, double held)
     return x;
 }
 
-// The lowest point with coordinate j held, from a start; absent when no run was usable.
-std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& start, Eigen::Index j) {
-    objective.at(start);
+// x with its coordinate j elsewhere.
+Eigen::VectorXd moved(Eigen::VectorXd x, Eigen::Index j, double to) {
+    x[j] = to;
+    return x;
+}
+
+// The lowest point with coordinate j held, from the lowest of some starts, which have it: where misfits have cliffs, a descent
+// from one of them may end far above what another has as it stands. Absent when no run was usable.
+std::optional<Run> lowest_with(Objective& objective, const std::vector<Eigen::VectorXd>& starts, Eigen::Index j) {
+    const Eigen::VectorXd* lowest_start = &starts.front();
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::VectorXd& candidate : starts) {
+        const auto there = objective.at(candidate);
+        if (there && there->usable() && there->misfit < least) {
+            least = there->misfit;
+            lowest_start = &candidate;
+        }
+    }
+    const Eigen::VectorXd& start = *lowest_start;
     if (start.size() > 1) {
         Objective others(
             start.size() - 1,
@@ -60,7 +78,8 @@ std::optional<Run> lowest_with(Objective& objective, const Eigen::VectorXd& star
 std::vector<Run> close_in(Objective& objective, Run inside, Run outside, Eigen::Index j, double least, double rise) {
     std::vector<Run> between;
     for (int i = 0; i < halvings && outside.evaluation->misfit > least + cliff * rise && !objective.exhausted(); ++i) {
-        const auto lowest = lowest_with(objective, 0.5 * (inside.x + outside.x), j);
+        const Eigen::VectorXd middle = 0.5 * (inside.x + outside.x);
+        const auto lowest = lowest_with(objective, {middle, moved(inside.x, j, middle[j])}, j);
         if (!lowest) {
             break;
         }
@@ -86,7 +105,7 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
             }
             Eigen::VectorXd start = i == 0 ? from : Eigen::VectorXd(2 * from - before).cwiseMax(0.0).cwiseMin(1.0);
             start[j] = held;
-            const auto lowest = lowest_with(objective, start, j);
+            const auto lowest = lowest_with(objective, {start, moved(from, j, held), moved(best.x, j, held)}, j);
             if (!lowest) {
                 break;
             }
@@ -159,7 +178,7 @@ std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::
         if (start[j] < 0 || start[j] > 1) {
             return std::nullopt;
         }
-        const auto lowest = lowest_with(objective, start, j);
+        const auto lowest = lowest_with(objective, {start, moved(last.x, j, start[j]), moved(best.x, j, start[j])}, j);
         if (!lowest) {
             return std::nullopt;
         }

@@ -49,6 +49,13 @@ StudyModel::StudyModel(const Study& study, Forward forward, double model_resolut
     for (const Experiment& experiment : tests_) {
         comparisons_.emplace_back(experiment, model_resolution);
     }
+    double weights = 0, squares = 0;
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+        const auto count = static_cast<double>(comparisons_[i].stations().size());
+        weights += count * tests_[i].weight;
+        squares += count * tests_[i].weight * tests_[i].weight;
+    }
+    prior_weight_ = squares / weights;
     const std::size_t stations = station_count();
     if (stations < study.parameters.size()) {
         throw InputError(study.file.empty() ? "study" : study.file.string(), "parameters",
@@ -166,7 +173,7 @@ void StudyModel::weigh(Evaluation& evaluation, const Eigen::VectorXd& values) co
     }
     for (Eigen::Index j = 0; j < box_.size(); ++j) {
         if (const auto& prior = box_.parameters()[static_cast<std::size_t>(j)].prior) {
-            residuals.push_back(counts_priors_ ? (values[j] - prior->mean) / prior->sd : 0.0);
+            residuals.push_back(counts_priors_ ? std::sqrt(prior_weight_) * (values[j] - prior->mean) / prior->sd : 0.0);
         }
     }
     evaluation.residuals = Eigen::Map<Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));

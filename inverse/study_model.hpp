@@ -74,6 +74,8 @@ class StudyModel {
     std::vector<std::string> left_out_;  // of the data, for a person
     double resolution_;
     bool counts_priors_ = true;
+    double prior_weight_ =
+        1;  // the mean of a measurement's, as Uncertainty::prior_weight: a factor on all weights changes nothing
     UnitBox box_;
     std::vector<Comparison> comparisons_;  // one an experiment
     SceneRuns runs_;

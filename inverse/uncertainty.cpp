@@ -38,6 +38,9 @@ Eigen::VectorXd weights_of(const MeasuredCurves& curves) {
     return Eigen::Map<Eigen::VectorXd>(weights.data(), static_cast<Eigen::Index>(weights.size()));
 }
 
+// How much a measurement has to say, on average by what it says: 1 where all weights are.
+double mean_weight(const Eigen::VectorXd& weights) { return weights.size() > 0 ? weights.squaredNorm() / weights.sum() : 1.0; }
+
 // Mean over the curves, by their lengths.
 double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>& curve_lengths) {
     double sum = 0;
@@ -108,8 +111,8 @@ Eigen::VectorXd left_by_data(const Directions& directions, const Eigen::VectorXd
 // What data and priors know of the best point in the parameters' units of a window.
 struct Knowledge {
     Eigen::MatrixXd covariance;  // told + that of what cannot be told
-    Eigen::MatrixXd told;        // (D^-1 + P)^-1
-    Eigen::MatrixXd curvature;   // inverse of that of half the misfit: (J^T W J + P)^-1
+    Eigen::MatrixXd told;        // the first term of covariance
+    Eigen::MatrixXd curvature;   // inverse of that of half the misfit: (J^T W J + c P)^-1
 };
 
 // By directions; an undetermined one gets the variance of a uniform distribution over the box.
@@ -118,16 +121,16 @@ Knowledge knowledge(const Directions& directions, const Eigen::VectorXd& weights
     const Eigen::MatrixXd scaled = directions.slope * directions.scale.asDiagonal() * directions.v;  // by directions
     const Eigen::MatrixXd of_data = scaled.topRows(data), of_priors = scaled.bottomRows(priors);
     const Eigen::MatrixXd weighted = weights.cwiseSqrt().asDiagonal() * of_data;
+    const double prior_weight = mean_weight(weights);
     const Eigen::MatrixXd nothing = Eigen::MatrixXd::Zero(p, p);
     Knowledge known{nothing, nothing, nothing};
     std::vector<Eigen::Index> told;
     for (Eigen::Index k = 0; k < p; ++k) {
         const Eigen::VectorXd direction = directions.scale.cwiseProduct(directions.v.col(k));
         const double largest = direction.cwiseAbs().maxCoeff();
-        const double noise =
-            of_data.col(k).squaredNorm() > 0 ? widening * weighted.col(k).squaredNorm() / of_data.col(k).squaredNorm() : 1.0;
-        const double precision = of_data.col(k).squaredNorm() / noise + of_priors.col(k).squaredNorm();
-        if (directions.resolved(k) && 4 * largest < std::sqrt(precision)) {
+        const double bend = of_data.col(k).squaredNorm() + of_priors.col(k).squaredNorm();
+        const double noise = widening * weighted.col(k).squaredNorm() + prior_weight * of_priors.col(k).squaredNorm();
+        if (directions.resolved(k) && 4 * largest * std::sqrt(noise) < bend) {
             told.push_back(k);
         } else {
             const double width = std::max(largest, undetermined.add(direction));  // no wider than the box
@@ -135,17 +138,15 @@ Knowledge knowledge(const Directions& directions, const Eigen::VectorXd& weights
         }
     }
     if (!told.empty()) {
-        const Eigen::MatrixXd a = of_data(Eigen::all, told).transpose() * of_data(Eigen::all, told);    // J^T W J
-        const Eigen::MatrixXd b = weighted(Eigen::all, told).transpose() * weighted(Eigen::all, told);  // J^T W^2 J
-        const Eigen::MatrixXd prior = of_priors(Eigen::all, told).transpose() * of_priors(Eigen::all, told);
-        const Eigen::MatrixXd precision = a * b.completeOrthogonalDecomposition().solve(a) / widening;  // D^-1
+        const Eigen::MatrixXd a = of_data(Eigen::all, told).transpose() * of_data(Eigen::all, told);          // J^T W J
+        const Eigen::MatrixXd b = weighted(Eigen::all, told).transpose() * weighted(Eigen::all, told);        // J^T W^2 J
+        const Eigen::MatrixXd prior = of_priors(Eigen::all, told).transpose() * of_priors(Eigen::all, told);  // c P
+        const Eigen::MatrixXd bend = a + prior;
+        const Eigen::MatrixXd inverse = bend.ldlt().solve(Eigen::MatrixXd::Identity(bend.rows(), bend.cols()));
         const Eigen::MatrixXd way = directions.scale.asDiagonal() * directions.v(Eigen::all, told);
-        const auto inverse = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
-            return way * m.ldlt().solve(Eigen::MatrixXd::Identity(m.rows(), m.cols())) * way.transpose();
-        };
-        known.told = inverse(precision + prior);
+        known.told = way * inverse * (widening * b + prior_weight * prior) * inverse * way.transpose();
         known.covariance += known.told;
-        known.curvature = inverse(a + prior);
+        known.curvature = way * inverse * way.transpose();
     }
     return known;
 }
@@ -259,7 +260,8 @@ Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& cur
     const Knowledge known = knowledge(*directions, weights, widening, undetermined);
     result.covariance = in_box(known.covariance) + own;
     result.widening = widening;
-    result.temperature = widening * weights.squaredNorm() / weights.sum();
+    result.prior_weight = mean_weight(weights);
+    result.temperature = widening * result.prior_weight;
     result.model_variance = own.diagonal();
     result.slope = slope_beside_jumps(*directions) * window.axes.inverse();
     result.untold = undetermined.untold();

@@ -34,6 +34,7 @@ struct Uncertainty {
     double reduced_chi_square = 0;
     std::string message;                  // what the intervals rest on, and what cannot be told, for a person
     double widening = 1;                  // s: of variances, for what the noise does not explain
+    double prior_weight = 1;              // c: on the misfit of priors
     double temperature = 1;               // T: of the data's likelihood exp(-misfit / 2 T), s and the weights taken in
     double quantile = 2;                  // of Student's distribution, from standard error to interval
     std::vector<Untold> untold = {};      // their sentences are part of `message` too
@@ -47,11 +48,12 @@ struct Uncertainty {
 /// The objective's points are those of a window of the box, and differences go along its axes; all that is told is of the box.
 /// There must be a usable run.
 ///
-/// covariance = (D^-1 + P)^-1 + V,  D = s (J^T W J)^-1 J^T W^2 J (J^T W J)^-1, J being the slope of a polynomial fitted to the
-/// runs about the best point, without priors, and
+/// covariance = H^-1 (s J^T W^2 J + c^2 P) H^-1 + V,  H = J^T W J + c P, J being the slope of a polynomial fitted to the runs
+/// about the best point, without priors, and
 ///  W = the weights: they say how much a curve has to say, not how large its noise is, so that a factor on all of them changes
-///  nothing (the sandwich of White 1980, Econometrica 48, for noise that is known); s (J^T J)^-1 where all are 1;
-///  P = what the priors know, which nothing widens;
+///  nothing (the sandwich of White 1980, Econometrica 48, for noise that is known); (J^T J / s + P)^-1 where s and all weights
+///  are 1;
+///  P = what the priors know, which nothing widens; c = the mean weight, by which they have been multiplied;
 ///  s = max(1, chi^2 tau), chi^2 the reduced chi-square of the data without weights and tau the correlation time of the
 ///  residuals along their curves: what the stated noise does not explain is taken for noise, and residuals that go together
 ///  count once;

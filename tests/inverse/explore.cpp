@@ -197,6 +197,26 @@ FitOptions cheap(const FakeWedge& wedge, int threads) {
     return options;
 }
 
+// A valley that goes on into a cliff, beyond which misfits fall away from it: a profile is nowhere above what the others have
+// where they stand at the best point.
+TEST(UnitProfile, IsNoHigherThanASlice) {
+    const auto evaluate = [](const Eigen::VectorXd& x, int) {
+        Evaluation evaluation;
+        evaluation.status = "finished";
+        evaluation.residuals = Eigen::Vector3d((x[0] - 0.5) / 0.2, x[1] - x[0], x[1] > 0.6 ? 12 - 10 * x[1] : 0.0);
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    };
+    Objective objective(2, evaluate, 100000, 1);
+    const Eigen::Vector2d middle(0.5, 0.5);
+    const auto best = objective.at(middle);
+    const Profile profile = profile_likelihood(objective, {middle, best}, 0, 0.4, 4.0);
+    EXPECT_GT(profile.x.back(), 0.8);
+    for (std::size_t i = 0; i < profile.x.size(); ++i) {
+        EXPECT_LE(profile.misfit[i], evaluate(Eigen::Vector2d(profile.x[i], 0.5), 1).misfit * (1 + 1e-12)) << profile.x[i];
+    }
+}
+
 TEST(SystemExplore, ProfileAndPosteriorOfAWedgeTest) {
     FakeWedge wedge;
     wedge.sharpness = 1;

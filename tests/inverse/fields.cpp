@@ -7,8 +7,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <random>
 
 namespace crampfit::testing {
@@ -50,10 +52,15 @@ Experiment measure(Scene scene, MeasuredFields fields, double noise_px, unsigned
     const Record record = simulate(scene);
     std::mt19937 generator(seed);
     std::normal_distribution<double> normal;
+    const auto noise_of_picture = [&]() -> Vec2 {
+        return noise_px * pixel / std::sqrt(2.0) * Vec2(normal(generator), normal(generator));
+    };
+    std::vector<Vec2> of_reference;  // against which each picture is correlated
+    std::generate_n(std::back_inserter(of_reference), fields.places.size(), noise_of_picture);
     for (const ProbeReading& reading : record.probes) {
         std::vector<Vec2>& moved = fields.moved.emplace_back();
         for (std::size_t i = 0; i < fields.places.size(); ++i)
-            moved.push_back(reading.moved[i] + noise_px * pixel * Vec2(normal(generator), normal(generator)));
+            moved.push_back(reading.moved[i] + noise_of_picture() - of_reference[i]);
         fields.sigma.emplace_back(fields.places.size(), noise_px * pixel);
     }
     double peak = 0;
@@ -148,10 +155,64 @@ TEST(UnitFields, AStillCameraSeesTheWholeMotion) {
     const double shift = 0.1 * pixel;
     for (std::vector<Vec2>& moved : measured.fields->moved)
         for (Vec2& m : moved) m.x() += shift;
-    const double points = 2.0 * static_cast<double>(measured.fields->places.size());
-    EXPECT_NEAR(misfit(FieldComparison(measured), record), 100 * points, 1e-3 * 100 * points);  // ten sigma each
+    // Ten sigma of the first picture; of the second half of that, which the reference's noise does not explain, in what is left
+    // of the variance, three quarters.
+    const double expected = (100 + 25 / 0.75) * static_cast<double>(measured.fields->places.size());
+    EXPECT_NEAR(misfit(FieldComparison(measured), record), expected, 1e-3 * expected);
     measured.fields->camera_moves = true;
     EXPECT_LT(misfit(FieldComparison(measured), record), 1e-9);
+}
+
+// Twelve pictures of a motion a x instant, each correlated with one reference: what a fit of a says of its error is what it
+// makes.
+TEST(UnitFields, NoiseOfTheReferenceIsCommonToAllPictures) {
+    constexpr double sigma = 1e-6, truth = 1e-5;
+    constexpr int pictures = 12, places = 8, draws = 300;
+    std::mt19937 generator(1);
+    std::normal_distribution<double> normal;
+    Experiment test;
+    MeasuredFields& fields = test.fields.emplace();
+    fields.camera_moves = false;
+    fields.subset = 0.1e-3;
+    for (int i = 0; i < places; ++i) fields.places.emplace_back(1e-3 * i, 0.0);
+    for (int k = 1; k <= pictures; ++k) fields.instants.push_back(k);
+    fields.sigma.assign(pictures, std::vector<double>(places, sigma));
+    const auto moved_by = [&](double a) {
+        Record record;
+        for (const double instant : fields.instants)
+            record.probes.push_back({std::vector<Vec2>(places, Vec2(a * instant, 0.5 * a * instant)), {}});
+        return record;
+    };
+    double squares = 0, chi_square = 0, neighbours = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+        const auto of_picture = [&]() -> Vec2 { return sigma / std::sqrt(2.0) * Vec2(normal(generator), normal(generator)); };
+        std::vector<Vec2> of_reference;
+        std::generate_n(std::back_inserter(of_reference), places, of_picture);
+        const Record record = moved_by(truth);
+        fields.moved.clear();
+        for (const ProbeReading& reading : record.probes) {
+            std::vector<Vec2>& moved = fields.moved.emplace_back();
+            for (int i = 0; i < places; ++i) moved.push_back(reading.moved[i] + of_picture() - of_reference[i]);
+        }
+        const FieldComparison comparison(test);
+        const auto residuals = [&](double a) {
+            const std::vector<double> modelled = comparison.modelled(moved_by(a));
+            Eigen::VectorXd r(static_cast<Eigen::Index>(modelled.size()));
+            for (Eigen::Index k = 0; k < r.size(); ++k) {
+                const FitResidual& station = comparison.stations()[static_cast<std::size_t>(k)];
+                r[k] = (modelled[static_cast<std::size_t>(k)] - station.measured) / station.sigma;
+            }
+            return r;
+        };
+        const Eigen::VectorXd r = residuals(truth), slope = (residuals(1.1 * truth) - r) / (0.1 * truth);
+        squares += std::pow(slope.dot(r) / slope.norm(), 2) / draws;  // the error of a over its standard error
+        chi_square += r.squaredNorm() / static_cast<double>(r.size()) / draws;
+        neighbours += r.head(r.size() - places).dot(r.tail(r.size() - places)) / static_cast<double>(r.size()) / draws;
+    }
+    std::printf("twelve pictures of one reference: error of a slope over its standard error %.3f rms\n", std::sqrt(squares));
+    EXPECT_NEAR(std::sqrt(squares), 1, 3 / std::sqrt(2.0 * draws));
+    EXPECT_NEAR(chi_square, 1, 0.02);
+    EXPECT_NEAR(neighbours, 0, 0.02);
 }
 
 TEST(UnitFields, PointsAtTheSimulatedCrackAreLeftOut) {

@@ -255,8 +255,9 @@ Parameter linear_toughness() {
     return parameter;
 }
 
-// What the noise does not explain widens what the data say, not the prior: (J^T J / s + P)^-1. Table, profile and posterior
-// agree: the latter's standard deviation is good to 1 / sqrt(2 x 800 independent samples), here three times that.
+// What the noise does not explain widens what the data say, not the prior, and the fit weighs both as the study says: the error
+// of that is (s J^T J + P)^1/2 / (J^T J + P), in the table and the profile. The posterior, (J^T J / s + P)^-1, is good to 1 /
+// sqrt(2 x 800 independent samples), here three times that.
 TEST(VerificationUncertainty, PriorsAreNotWidened) {
     for (const double sd : {0.5, 5.0}) {
         for (const double error : {0.8, 4.0}) {
@@ -271,18 +272,49 @@ TEST(VerificationUncertainty, PriorsAreNotWidened) {
                 chi_square += residual.residual * residual.residual / 39;
             }
             EXPECT_NEAR(fit.reduced_chi_square / chi_square, 1, 1e-5);  // samples come upon runs as good as the same
-            const double expected = 1 / std::sqrt(LinearTest::information(1.0) / std::max(1.0, chi_square) + 1 / (sd * sd));
+            const double s = std::max(1.0, chi_square), a = LinearTest::information(1.0), p = 1 / (sd * sd);
+            const double expected = std::sqrt(s * a + p) / (a + p), of_posterior = 1 / std::sqrt(a / s + p);
             EXPECT_NEAR(fit.parameters[0].standard_error / expected, 1, 1e-3) << sd << " " << error;
             double variance = 0;
             for (const PosteriorSample& sample : fit.posterior) {
                 variance += std::pow(sample.parameters[0] - fit.parameters[0].value, 2) / 16000;
             }
-            EXPECT_NEAR(std::sqrt(variance) / expected, 1, 0.075) << sd << " " << error;
+            EXPECT_NEAR(std::sqrt(variance) / of_posterior, 1, 0.075) << sd << " " << error;
             study.uncertainty = {.profile = true, .posterior = 0};
             const FittedParameter profiled = fit_study(study, LinearTest::options()).parameters[0];
             EXPECT_NEAR((profiled.upper_95 - profiled.lower_95) / (2 * student_975(39) * expected), 1, 0.01);
         }
     }
+}
+
+// A factor on all weights changes nothing beside a prior either. And errors are those of what the fit does: over many tests whose
+// noise was stated too small, with priors that are right.
+TEST(VerificationUncertainty, ErrorsBesidePriorsAreThoseOfTheFit) {
+    const double sd = 1 / std::sqrt(LinearTest::information(1.0));
+    std::mt19937 generator(3);
+    std::normal_distribution<double> normal;
+    double squares = 0;
+    constexpr int tests = 60;
+    for (int k = 0; k < tests; ++k) {
+        Study study;
+        study.experiments = {LinearTest::experiment("a", 110, 0, 1.0)};
+        for (double& force : study.experiments[0].data.force) {
+            force += 5 * normal(generator);
+        }
+        study.parameters = {linear_toughness()};
+        study.parameters[0].prior = Prior{110 + sd * normal(generator), sd};
+        const FittedParameter found = fit_study(study, LinearTest::options()).parameters[0];
+        squares += std::pow((found.value - 110) / found.standard_error, 2) / tests;
+        if (k == 0) {
+            for (const double factor : {0.02, 50.0}) {
+                study.experiments[0].weight = factor;
+                const FittedParameter weighted = fit_study(study, LinearTest::options()).parameters[0];
+                EXPECT_NEAR((weighted.value - found.value) / sd, 0, 1e-3) << factor;
+                EXPECT_NEAR(weighted.standard_error / found.standard_error, 1, 1e-3) << factor;
+            }
+        }
+    }
+    EXPECT_NEAR(std::sqrt(squares), 1, 3 / std::sqrt(2.0 * tests));
 }
 
 // Weights say how much each test has to say: with J^T J = A of each, the errors of two are those of the weighted mean of what
