@@ -233,9 +233,11 @@ void follow_untold(CloseLook& look, const std::vector<std::string>& names, const
     }
 }
 
-// Puts the profile's intervals in the place of those of a parabola, unless one of them goes on beyond its window. Where the
-// parameters cannot be told, `confirm` says whether a misfit at a point of the box is what a run finds there.
-Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::VectorXd&, double misfit, double rise)>& confirm) {
+// Puts the profile's intervals in the place of those of a parabola, unless one of them goes on beyond its window; what a closer
+// look has told of the best point itself stays. Where the parameters cannot be told, `confirm` says whether a misfit at a point
+// of the box is what a run finds there.
+Profiled take_profile(CloseLook& look, const Uncertainty& closer,
+                      const std::function<bool(const Eigen::VectorXd&, double misfit, double rise)>& confirm) {
     Uncertainty& u = look.uncertainty;
     if (u.model_variance.size() == 0) {
         return Profiled::goes_on;
@@ -248,7 +250,7 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
         CloseLook::Along way = look.along(j);
         const double scale = way.window.axes(j, 0);
         double below = 0, above = 0;  // distances
-        const double own = told ? u.quantile * std::sqrt(u.model_variance[j]) : 0.0;
+        const double own = told ? u.quantile * std::sqrt((all_told(closer) ? closer : u).model_variance[j]) : 0.0;
         if (told) {
             const double variance = u.covariance(j, j) - u.model_variance[j];
             const Eigen::VectorXd valley = way.covariance.col(0) / way.covariance(0, 0);
@@ -257,7 +259,7 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
                     least = std::min(least, way.objective.best()->evaluation->misfit);
                 }
                 const double half = u.quantile * std::sqrt(variance) / scale;
-                const auto found = profile_end(way.objective, way.best, 0, side, half, valley, least, level);
+                const auto found = profile_end(way.objective, way.best, 0, side, half, valley, least, level, way.alone);
                 const double edge = way.window.origin[j] + (side < 0 ? 0.0 : scale);
                 const bool is_bound = edge < rounding || edge > 1.0 - rounding;
                 return found || !is_bound ? found : std::optional(std::abs(edge - u.best.x[j]) / scale);
@@ -270,7 +272,7 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
             above = *high * scale;
         } else {
             constexpr double coarse = 0.2;  // of the window: four of the profile's steps
-            const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level);
+            const Profile profile = profile_likelihood(way.objective, way.best, 0, coarse, level, way.alone);
             const double lowest = *std::min_element(profile.misfit.begin(), profile.misfit.end());
             if (is_confined(profile, way.window, lowest + level)) {
                 return Profiled::goes_on;
@@ -295,6 +297,13 @@ Profiled take_profile(CloseLook& look, const std::function<bool(const Eigen::Vec
     }
     if (told) {
         // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
+        if (all_told(closer)) {
+            u.covariance = closer.covariance;
+            u.model_variance = closer.model_variance;
+            u.slope = closer.slope;
+            u.lower_95 = closer.lower_95;
+            u.upper_95 = closer.upper_95;
+        }
         u.lower_95 = u.lower_95.cwiseMin(lower);
         u.upper_95 = u.upper_95.cwiseMax(upper);
         const Eigen::VectorXd sd = u.covariance.diagonal().cwiseSqrt();
@@ -332,7 +341,8 @@ CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
     return {along,
             Objective(objective.parameters(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()),
             {along.share(uncertainty.best.x), uncertainty.best.evaluation},
-            inverse * uncertainty.covariance * inverse.transpose()};
+            inverse * uncertainty.covariance * inverse.transpose(),
+            inverse.col(parameter) / inverse(0, parameter)};
 }
 
 std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, const Eigen::VectorXd& x,
@@ -379,8 +389,9 @@ std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, 
         return run && run->usable() && std::abs(run->misfit - misfit) < as_promised * rise_there;
     };
     auto profiled = std::optional(all_told(found.uncertainty) ? found : *first);
+    const Uncertainty closest = profiled->uncertainty;
     for (int i = 0; i < most_profiles && profiled && !objective.stopped(); ++i) {
-        const Profiled how = take_profile(*profiled, confirm);
+        const Profiled how = take_profile(*profiled, closest, confirm);
         if (how == Profiled::taken) {
             return profiled;
         }

@@ -26,6 +26,7 @@ struct CloseLook {
         Objective objective;
         Run best;                    // of the window
         Eigen::MatrixXd covariance;  // the same
+        Eigen::VectorXd alone;       // how its coordinates go with the first while the other parameters stay
     };
     Along along(Eigen::Index parameter) const;
 };

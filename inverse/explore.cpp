@@ -70,7 +70,7 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
                 CloseLook::Along way = close->along(j);
                 way.objective.set_budget_left(runs_of_a_profile);
                 const double half_width = uncertainty.quantile * std::sqrt(way.covariance(0, 0));
-                Profile profile = profile_likelihood(way.objective, way.best, 0, half_width, rise);
+                Profile profile = profile_likelihood(way.objective, way.best, 0, half_width, rise, way.alone);
                 for (double& x : profile.x) {
                     x = std::clamp(way.window.origin[j] + x * way.window.axes(j, 0), 0.0, 1.0);
                 }

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -32,54 +32,55 @@ Eigen::VectorXd with(const Eigen::VectorXd& others, Eigen::Index j, double held)
     return x;
 }
 
-// x with its coordinate j elsewhere.
-Eigen::VectorXd moved(Eigen::VectorXd x, Eigen::Index j, double to) {
-    x[j] = to;
-    return x;
+// The point with coordinate j held elsewhere, where the parameters behind the others stay.
+Eigen::VectorXd moved(const Eigen::VectorXd& x, Eigen::Index j, double to, const Eigen::VectorXd& alone) {
+    Eigen::VectorXd there = alone.size() > 0 ? Eigen::VectorXd(x + (to - x[j]) * alone) : x;
+    there[j] = to;
+    return there;
 }
 
 // The lowest point with coordinate j held, from the lowest of some starts, which have it: where misfits have cliffs, a descent
 // from one of them may end far above what another has as it stands. Absent when no run was usable.
 std::optional<Run> lowest_with(Objective& objective, const std::vector<Eigen::VectorXd>& starts, Eigen::Index j) {
-    const Eigen::VectorXd* lowest_start = &starts.front();
-    double least = std::numeric_limits<double>::infinity();
-    for (const Eigen::VectorXd& candidate : starts) {
-        const auto there = objective.at(candidate);
-        if (there && there->usable() && there->misfit < least) {
-            least = there->misfit;
-            lowest_start = &candidate;
+    std::optional<Run> lowest;
+    const auto take = [&](const Eigen::VectorXd& x, const std::shared_ptr<const Evaluation>& there) {
+        if (there && there->usable() && (!lowest || there->misfit < lowest->evaluation->misfit)) {
+            lowest = Run{x, there};
         }
+    };
+    for (const Eigen::VectorXd& start : starts) {
+        take(start, objective.at(start));
     }
-    const Eigen::VectorXd& start = *lowest_start;
-    if (start.size() > 1) {
-        Objective others(
-            start.size() - 1,
-            [&](const Eigen::VectorXd& y, int) {
-                const auto there = objective.at(with(y, j, start[j]));
-                return there ? *there : Evaluation{"not run", {}, {}};
-            },
-            runs_of_a_descent * static_cast<int>(start.size() - 1), 1);
-        minimize_with_ceres(others, without(start, j));
-        if (others.best()) {  // across kinks, where slopes mislead
-            others.set_budget_left(runs_across_kinks * static_cast<int>(start.size() - 1));
-            const Eigen::VectorXd lowest = others.best()->x;
-            minimize(others, lowest, {"sbplx"});
-        }
-        if (others.best()) {
-            return Run{with(others.best()->x, j, start[j]), others.best()->evaluation};
-        }
-        return std::nullopt;
+    if (starts.front().size() == 1) {
+        return lowest;
     }
-    const auto there = objective.at(start);
-    return there && there->usable() ? std::optional(Run{start, there}) : std::nullopt;
+    const Eigen::VectorXd start = (lowest ? lowest->x : starts.front()).cwiseMax(0.0).cwiseMin(1.0);
+    Objective others(
+        start.size() - 1,
+        [&](const Eigen::VectorXd& y, int) {
+            const auto there = objective.at(with(y, j, start[j]));
+            return there ? *there : Evaluation{"not run", {}, {}};
+        },
+        runs_of_a_descent * static_cast<int>(start.size() - 1), 1);
+    minimize_with_ceres(others, without(start, j));
+    if (others.best()) {  // across kinks, where slopes mislead
+        others.set_budget_left(runs_across_kinks * static_cast<int>(start.size() - 1));
+        const Eigen::VectorXd best = others.best()->x;
+        minimize(others, best, {"sbplx"});
+    }
+    if (others.best()) {
+        take(with(others.best()->x, j, start[j]), others.best()->evaluation);
+    }
+    return lowest;
 }
 
 // Points between one that is not as high as `least` + `rise` and one beyond, halving the way for as long as a cliff lies in it.
-std::vector<Run> close_in(Objective& objective, Run inside, Run outside, Eigen::Index j, double least, double rise) {
+std::vector<Run> close_in(Objective& objective, Run inside, Run outside, Eigen::Index j, double least, double rise,
+                          const Eigen::VectorXd& alone) {
     std::vector<Run> between;
     for (int i = 0; i < halvings && outside.evaluation->misfit > least + cliff * rise && !objective.exhausted(); ++i) {
         const Eigen::VectorXd middle = 0.5 * (inside.x + outside.x);
-        const auto lowest = lowest_with(objective, {middle, moved(inside.x, j, middle[j])}, j);
+        const auto lowest = lowest_with(objective, {middle, moved(inside.x, j, middle[j], alone)}, j);
         if (!lowest) {
             break;
         }
@@ -91,7 +92,8 @@ std::vector<Run> close_in(Objective& objective, Run inside, Run outside, Eigen::
 
 }  // namespace
 
-Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise) {
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise,
+                           const Eigen::VectorXd& alone) {
     const double step = std::clamp(0.25 * half_width, least_step, largest_step);
     Profile below, above;
     for (auto* side : {&below, &above}) {
@@ -105,7 +107,7 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
             }
             Eigen::VectorXd start = i == 0 ? from : Eigen::VectorXd(2 * from - before).cwiseMax(0.0).cwiseMin(1.0);
             start[j] = held;
-            const auto lowest = lowest_with(objective, {start, moved(from, j, held), moved(best.x, j, held)}, j);
+            const auto lowest = lowest_with(objective, {start, moved(from, j, held, alone), moved(best.x, j, held, alone)}, j);
             if (!lowest) {
                 break;
             }
@@ -115,7 +117,7 @@ Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j
                 side->lowest.push_back(run.x);
             };
             if (lowest->evaluation->misfit > best.evaluation->misfit + 1.5 * rise) {
-                auto between = close_in(objective, last, *lowest, j, best.evaluation->misfit, rise);
+                auto between = close_in(objective, last, *lowest, j, best.evaluation->misfit, rise, alone);
                 std::ranges::sort(between, {}, [&](const Run& run) { return std::abs(run.x[j] - best.x[j]); });
                 std::ranges::for_each(between, take_in);
                 take_in(*lowest);
@@ -165,7 +167,7 @@ std::pair<double, double> interval(const Profile& profile, double least, double 
 }
 
 std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
-                                  const Eigen::VectorXd& valley, double least, double rise) {
+                                  const Eigen::VectorXd& valley, double least, double rise, const Eigen::VectorXd& alone) {
     constexpr int most_trials = 16;
     constexpr double farthest = 2.0;  // of the distance before
     const double level = std::sqrt(rise);
@@ -178,7 +180,8 @@ std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::
         if (start[j] < 0 || start[j] > 1) {
             return std::nullopt;
         }
-        const auto lowest = lowest_with(objective, {start, moved(last.x, j, start[j]), moved(best.x, j, start[j])}, j);
+        const auto lowest =
+            lowest_with(objective, {start, moved(last.x, j, start[j], alone), moved(best.x, j, start[j], alone)}, j);
         if (!lowest) {
             return std::nullopt;
         }
@@ -188,7 +191,7 @@ std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::
                 return distance;
             }
             double outside = distance, height_outside = height;
-            for (const Run& run : close_in(objective, last, *lowest, j, least, rise)) {
+            for (const Run& run : close_in(objective, last, *lowest, j, least, rise, alone)) {
                 const double there = std::sqrt(std::max(0.0, run.evaluation->misfit - least));
                 (there < level ? inside : outside) = std::abs(run.x[j] - best.x[j]);
                 (there < level ? height_inside : height_outside) = there;

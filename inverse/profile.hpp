@@ -20,9 +20,12 @@ struct Profile {
 
 /// The profile of parameter j about the best run, outwards in steps of about a fourth of the `half_width` that its interval is
 /// expected to have, until the misfit has risen by `rise` or the bound is reached. Each point takes a descent of the others from
-/// where the one before ended; a point at which all runs fail ends its side. Venzon and Moolgavkar (1988), A method for computing
-/// profile-likelihood-based confidence intervals, Applied Statistics 37.
-Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise);
+/// where the one before ended, or where they are at the best run, and is no higher than there; a point at which all runs fail
+/// ends its side. Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence intervals, Applied
+/// Statistics 37. `alone` [parameters], alone_j = 1: how the others go with coordinate j while what they stand for stays; empty:
+/// they stay.
+Profile profile_likelihood(Objective& objective, const Run& best, Eigen::Index j, double half_width, double rise,
+                           const Eigen::VectorXd& alone = {});
 
 /// Where the profile comes up to `rise` above `least` below and above its lowest point: between two of its points as the square
 /// root of the rise goes, which is a straight line in a linear problem. A side that does not come up to it: its end's 0 or 1.
@@ -32,6 +35,6 @@ std::pair<double, double> interval(const Profile& profile, double least, double 
 /// a parabola has it or farther. Looked for from the parabola's end, `distance` along its `valley` [parameters], valley_j = 1,
 /// and not followed from the best run on. Absent where it does not come up within the cube, or no run was usable.
 std::optional<double> profile_end(Objective& objective, const Run& best, Eigen::Index j, int side, double distance,
-                                  const Eigen::VectorXd& valley, double least, double rise);
+                                  const Eigen::VectorXd& valley, double least, double rise, const Eigen::VectorXd& alone = {});
 
 }  // namespace crampfit
