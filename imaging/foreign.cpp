@@ -216,13 +216,27 @@ std::optional<Ground> ground_in_corners(const cv::Mat& gray) {
 
 }  // namespace
 
-cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black) {
-    constexpr double apart = 0.03;  // beyond the limit of black or white: another gray for sure
-    constexpr double rim = 0.1;     // EW may be as white as the ground, LW is not
+double noise_of_black(const cv::Mat& gray, double black) {
+    constexpr double most_even = 0.1;
     cv::Mat mean, squares;
     cv::blur(gray, mean, {5, 5});
     cv::blur(gray.mul(gray), squares, {5, 5});
-    const cv::Mat even = squares - mean.mul(mean) < blank_grain * blank_grain;
+    const cv::Mat variance = squares - mean.mul(mean);
+    std::vector<float> there;
+    for (int v = 2; v < gray.rows - 2; ++v)
+        for (int u = 2; u < gray.cols - 2; ++u)
+            if (mean.at<float>(v, u) < static_cast<float>(black)) there.push_back(variance.at<float>(v, u));
+    return std::sqrt(std::max(0.0, quantile(std::move(there), most_even)));
+}
+
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black, double noise) {
+    constexpr double most_scatter = 1.8;  // of what its most even tenth has: of 25 pixels nearly all have less
+    constexpr double apart = 0.03;        // beyond the limit of black or white: another gray for sure
+    constexpr double rim = 0.1;           // EW may be as white as the ground, LW is not
+    cv::Mat mean, squares;
+    cv::blur(gray, mean, {5, 5});
+    cv::blur(gray.mul(gray), squares, {5, 5});
+    const cv::Mat even = squares - mean.mul(mean) < std::pow(std::max(blank_grain, most_scatter * noise), 2);
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
     for (const bool dark : {true, false}) {
         cv::Mat colour;

@@ -19,8 +19,13 @@ struct WoodView {
 
 /// 255 where the picture shows an even black or white that reaches in from one of its corners: what lies around a specimen on a
 /// scanner or a table. Where as much of the picture's inside is as plain, rings are drawn so. Known before anything about the
-/// wood is. `gray` and `bgr` as in a view; `black` is the brightest black, of the picture's brightest.
-cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black = 0.08);
+/// wood is. `gray` and `bgr` as in a view; `black` is the brightest black, of the picture's brightest; `noise` the standard
+/// deviation of a camera's pixels there.
+cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black = 0.08, double noise = 0.0);
+
+/// Standard deviation of the pixels where it is black (as above): that of the most even tenth, which an even ground has of noise
+/// alone.
+double noise_of_black(const cv::Mat& gray, double black);
 
 /// 255 where the picture shows a ground of any one gray, as even as noise, that reaches in from at least three of its corners.
 /// Rings show the same gray within, too, and no even one where the light on them is not. `gray` as in a view.

@@ -2,6 +2,7 @@
 
 #include "datasets/error.hpp"
 #include "imaging/pixels.hpp"
+#include "imaging/resolution_tag.hpp"
 
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -81,7 +82,7 @@ bool is_cut_short(const std::vector<std::uint8_t>& bytes) {
 }
 
 /// What white is in a PGM or PPM, which cameras of 10 and 12 bits write: the third number of the header, comments aside; 0: it is
-/// none. The library takes numbers beyond 255 as they are.
+/// none. The library takes numbers as they are, but for those of 8 bits in text.
 int white_of_netpbm(const std::vector<std::uint8_t>& bytes) {
     constexpr std::size_t longest_header = 4096;
     const std::string text(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min(bytes.size(), longest_header)));
@@ -151,8 +152,12 @@ cv::Mat read_pixels(const std::filesystem::path& file, const PictureKey& asked_b
         if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
             fail("must be a picture of 8 or 16 bits a channel");
         }
-        if (const int white = white_of_netpbm(bytes); white > 0 && picture.depth() == CV_16U) {
-            picture *= 65535.0 / white;
+        const bool is_fine = picture.depth() == CV_16U, is_text = bytes.size() > 1 && (bytes[1] == '2' || bytes[1] == '3');
+        if (const int white = white_of_netpbm(bytes); white > 0 && (is_fine || !is_text)) {
+            picture *= (is_fine ? 65535.0 : 255.0) / white;
+        }
+        if (is_fine && picture.channels() == 1 && white_is_zero(file)) {  // of 8 bits the library turns it
+            cv::subtract(cv::Scalar(65535), picture, picture);
         }
         return picture;
     } catch (const cv::Exception&) {

@@ -23,6 +23,7 @@ constexpr double most_left = 0.7;       // of the reference's contrast, in pictu
 constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
 constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
 constexpr double slack = 3;             // of the line's middle [px]
+constexpr double most_noise = 0.03;     // of its pixels, of the picture's brightest: a camera's in poor light
 constexpr double ground = 0.3;          // of the picture's brightest, up to which an even ground about the specimen is dark
 constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
 
@@ -158,9 +159,10 @@ GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::ui
     state->reference = pixels_of(reference);
     double brightest = 0;
     cv::minMaxLoc(state->reference, nullptr, &brightest);
+    const cv::Mat gray = state->reference / std::max(brightest, 1.0);
+    const double noise = std::min(noise_of_black(gray, ground), most_noise);
     // Bright wood without any pattern is as even as a bright ground.
-    state->specimen = (find_blank(state->reference / std::max(brightest, 1.0), {}, ground) == 0) |
-                      (state->reference > 0.5 * cv::mean(state->reference)[0]);
+    state->specimen = (find_blank(gray, {}, ground, noise) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
     state->allowed = state->specimen.clone();
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;

@@ -60,13 +60,22 @@ std::optional<PixelTag> jpeg(const Bytes& bytes) {
     return pixel(per_metre(bytes.number(14, 2), unit == 1), per_metre(bytes.number(16, 2), unit == 1));
 }
 
-/// TIFF 6.0: tags 282 and 283 are fractions, 296 is their unit (2: inch, the default; 3: centimetre).
-std::optional<PixelTag> tiff(Bytes bytes) {
+bool is_tiff(const Bytes& bytes) {
+    return bytes.text(0, 4) == std::string_view("II*\0", 4) || bytes.text(0, 4) == std::string_view("MM\0*", 4);
+}
+
+/// What the first picture of a TIFF file says of itself (TIFF 6.0): tag 262 is its colours (0: of gray, white is 0), 282 and 283
+/// are fractions, 296 is their unit (2: inch, the default; 3: centimetre).
+struct TiffTags {
+    std::uint32_t colours = 1, unit = 2;
+    double x = 0, y = 0;
+};
+
+TiffTags tiff_tags(Bytes bytes) {
     bytes.big_endian = bytes.text(0, 2) == "MM";
     const std::size_t directory = bytes.number(4, 4);
     const std::uint32_t entries = bytes.number(directory, 2);
-    double x = 0, y = 0;
-    std::uint32_t unit = 2;
+    TiffTags tags;
     for (std::uint32_t i = 0; i < entries; ++i) {
         const std::size_t entry = directory + 2 + 12 * std::size_t{i};
         const auto fraction = [&] {
@@ -75,21 +84,36 @@ std::optional<PixelTag> tiff(Bytes bytes) {
             return below > 0 ? bytes.number(at, 4) / below : 0;
         };
         switch (bytes.number(entry, 2)) {
+        case 262:
+            tags.colours = bytes.number(entry + 8, 2);
+            break;
         case 282:
-            x = fraction();
+            tags.x = fraction();
             break;
         case 283:
-            y = fraction();
+            tags.y = fraction();
             break;
         case 296:
-            unit = bytes.number(entry + 8, 2);
+            tags.unit = bytes.number(entry + 8, 2);
             break;
         default:
             break;
         }
     }
+    return tags;
+}
+
+std::optional<PixelTag> tiff(Bytes bytes) {
+    const auto [colours, unit, x, y] = tiff_tags(std::move(bytes));
     if (unit != 2 && unit != 3) return std::nullopt;
     return pixel(per_metre(x, unit == 2), per_metre(y, unit == 2));
+}
+
+Bytes bytes_of(const std::filesystem::path& image) {
+    std::ifstream in(image, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return Bytes(std::move(text).str());
 }
 
 }  // namespace
@@ -99,19 +123,20 @@ bool PixelTag::square() const { return std::abs(width / height - 1) < 1e-3; }
 std::string PixelTag::dots() const { return fmt::format("{:.6g} x {:.6g} dpi", 0.0254 / width, 0.0254 / height); }
 
 std::optional<PixelTag> pixel_by_tag(const std::filesystem::path& image) {
-    std::ifstream in(image, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    Bytes bytes(std::move(text).str());
+    Bytes bytes = bytes_of(image);
     if (bytes.text(0, 8) == "\x89PNG\r\n\x1a\n") return png(bytes);
     if (bytes.text(0, 3) == "\xff\xd8\xff") return jpeg(bytes);
-    if (bytes.text(0, 4) == std::string_view("II*\0", 4) || bytes.text(0, 4) == std::string_view("MM\0*", 4))
-        return tiff(std::move(bytes));
+    if (is_tiff(bytes)) return tiff(std::move(bytes));
     if (bytes.text(0, 2) == "BM") {
         bytes.big_endian = false;
         return pixel(bytes.number(38, 4), bytes.number(42, 4));
     }
     return std::nullopt;
+}
+
+bool white_is_zero(const std::filesystem::path& image) {
+    Bytes bytes = bytes_of(image);
+    return is_tiff(bytes) && tiff_tags(std::move(bytes)).colours == 0;
 }
 
 }  // namespace crampfit

@@ -473,7 +473,9 @@ Segmentation segment(const std::filesystem::path& image, const SegmentOptions& o
     if (options.density) fill_density(specimen, image, *options.density, result.notes);
     for (std::size_t i = 0; i < second.borders.size(); ++i)
         specimen.borders.push_back(polyline_of(second.borders[i], static_cast<std::int64_t>(i) + 1, frame));
-    specimen.rings = ring_figures(second.borders, classes, static_cast<int>(specimen.classes.size()) - 1, second.features);
+    const auto latewood = std::ranges::find(specimen.classes, "LW");  // else the last class
+    const auto number = std::min(latewood - specimen.classes.begin(), std::ssize(specimen.classes) - 1);
+    specimen.rings = ring_figures(second.borders, classes, static_cast<int>(number), second.features);
     if (!second.obstacle.empty() && options.borders.empty()) result.notes.push_back(second.obstacle);
     std::string found = fmt::format("{} ring borders{}, {} rings between them", specimen.borders.size(),
                                     options.borders.empty() ? "" : " as given", specimen.rings.size());

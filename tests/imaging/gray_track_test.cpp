@@ -111,24 +111,24 @@ TEST(VerificationGrayTrack, WayOfACrackThatHasGoneThrough) {
     EXPECT_LT(worst, 5);
 }
 
-// A specimen before a dark ground, black or gray, which shows through the crack: it begins at the specimen's edge, and ends there
-// when both halves have parted over the ground.
+// A specimen before a dark ground, black or gray, under a camera's noise, which shows through the crack: it begins at the
+// specimen's edge, and ends there when both halves have parted over the ground.
 TEST(VerificationGrayTrack, CrackOfASpecimenOnADarkGround) {
     constexpr int margin = 40;
     const cv::Mat wood = end_grain_picture(columns, rows, 60, {-2000, 200}, 3);
     const cv::Rect specimen(margin, margin, columns - 2 * margin, rows - 2 * margin);
-    for (const int gray : {8, 30, 50}) {
+    for (const auto& [gray, noise] : {std::pair{8, 0.0}, {30, 0.0}, {50, 0.0}, {10, 2.0}, {10, 4.0}, {40, 3.0}}) {
         cv::Mat picture(wood.size(), CV_8U, cv::Scalar(gray));
         wood(specimen).copyTo(picture(specimen));
         const WoodCamera camera(picture, gray);
-        const GrayTracker tracker(camera.take({}), {});
-        WoodShot shot{.seed = 5};
+        const GrayTracker tracker(camera.take({.noise = noise, .seed = 4}), {});
+        WoodShot shot{.noise = noise, .seed = 5};
         const Vec2 truth(240.3, 200.7);
         shot.displacement = crack_field(truth, 0, 8, 0, {0.4, -0.3});
         const CrackTip tip = tracker.tip(camera.take(shot));
         ASSERT_EQ(tip.status, TipStatus::ok) << gray;
-        std::printf("on a ground of gray %d: tip off by %.2f px, length by %.2f px\n", gray, (tip.tip - truth).norm(),
-                    tip.length - (truth.x() - margin + 0.5));
+        std::printf("on a ground of gray %d, noise %.0f: tip off by %.2f px, length by %.2f px\n", gray, noise,
+                    (tip.tip - truth).norm(), tip.length - (truth.x() - margin + 0.5));
         EXPECT_LT((tip.tip - truth).norm(), 5) << gray;
         EXPECT_NEAR(tip.length, truth.x() - margin + 0.5, 5) << gray;
         shot.displacement = [&](const Vec2& px) { return px.y() < truth.y() ? Vec2(0, -6) : Vec2(0, 6); };

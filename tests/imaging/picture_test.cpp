@@ -5,6 +5,7 @@
 
 #include "datasets/error.hpp"
 #include "datasets/io.hpp"
+#include "datasets/text_file.hpp"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
@@ -130,6 +131,23 @@ TEST(UnitPicture, WhiteOfAPgmIsWhatItsHeaderSays) {
     };
     EXPECT_EQ(gray_of("P5\n# a camera's\n1 1\n4095\n", 1991), 124);
     EXPECT_EQ(gray_of("P5 1 1 65535\n", 31868), 124);
+    // Of 8 bits: 49 of 100 are 124.95 of 255.
+    for (const char* text : {"P5 1 1 100\n1", "P2 1 1 100\n49\n"})
+        EXPECT_NEAR(int{read_gray(folder.write("camera.pgm", text), {"test", "picture"}).gray.at(0)}, 124.95, 1) << text;
+}
+
+// PhotometricInterpretation 0, tag 262 of a TIFF.
+TEST(UnitPicture, ATiffThatCountsFromWhiteIsTurned) {
+    const TemporaryFolder folder;
+    const auto file = folder / "white.tiff";
+    cv::imwrite(file.string(), cv::Mat(1, 2, CV_16UC1, cv::Scalar(50 * 257)), {cv::IMWRITE_TIFF_COMPRESSION, 1});
+    std::string bytes = read_text(file);
+    const std::string black_is_zero("\x06\x01\x03\0\x01\0\0\0\x01", 9);
+    const std::size_t at = bytes.find(black_is_zero);
+    ASSERT_NE(at, std::string::npos);
+    EXPECT_EQ(int{read_gray(file, {"test", "picture"}).gray.at(0)}, 50);
+    bytes[at + 8] = 0;
+    EXPECT_EQ(int{read_gray(folder.write("turned.tiff", bytes), {"test", "picture"}).gray.at(0)}, 205);
 }
 
 TEST(UnitPicture, PaletteBmp) {

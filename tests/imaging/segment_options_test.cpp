@@ -78,6 +78,27 @@ TEST(UnitSegment, ClassesByGivenGrays) {
     EXPECT_THROW(segment_pixels(pixels, options), InputError);
 }
 
+// LW is the class of that name, darker ones or not.
+TEST(UnitSegment, LatewoodOfRingsIsTheClassOfThatName) {
+    cv::Mat pixels = picture_of(grow_end_grain({}));
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(pixels, &darkest, &brightest);
+    ASSERT_GT(darkest, 10);
+    const int middle = static_cast<int>(0.5 * (darkest + brightest));
+    pixels(cv::Rect(20, 20, 6, 6)) = 2;
+    SegmentOptions two, three;
+    two.gray = {{"EW", middle, 255}, {"LW", 0, middle - 1}};
+    three.gray = {{"EW", middle, 255}, {"LW", 6, middle - 1}, {"resin", 0, 5}};
+    const std::vector<RingFigures> plain = segment_pixels(pixels, two).specimen.rings,
+                                   resinous = segment_pixels(pixels, three).specimen.rings;
+    ASSERT_EQ(plain.size(), resinous.size());
+    ASSERT_GT(plain.size(), 2U);
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+        EXPECT_GT(plain[i].latewood_fraction, 0.05);
+        EXPECT_NEAR(resinous[i].latewood_fraction, plain[i].latewood_fraction, 0.02);
+    }
+}
+
 TEST(UnitSegment, DirectionFromASecondPicture) {
     const cv::Mat pixels = picture_of(grow_end_grain({}));
     cv::Mat stripes(pixels.size(), CV_8U);
