@@ -38,8 +38,10 @@ void read_instants(const Entry& entry, const FieldSeries& series, MeasuredFields
     }
     for (std::size_t i = 0; i < fields.instants.size(); ++i) {
         if (!(fields.instants[i] >= (i > 0 ? fields.instants[i - 1] : 0.0))) {
-            at.fail(fmt::format("the pictures' {} must rise from 0 on, without gaps: {:g} in row {}",
-                                fields.by_displacement ? "displacements" : "times", fields.instants[i], i + 1));
+            at.fail(fmt::format("the pictures' {} must rise from 0 on, without gaps: {:g} {} in row {}",
+                                fields.by_displacement ? "displacements" : "times",
+                                (fields.by_displacement ? 1e3 : 1.0) * fields.instants[i], fields.by_displacement ? "mm" : "s",
+                                i + 1));
         }
     }
 }

@@ -362,6 +362,25 @@ void choose_wood_unseen(const Scene& scene, Plan& plan, const MaterialMap& mater
                             "the picture does not reach there: taken for the wood of its nearest pixel", true});
 }
 
+// A map of density that goes far beyond that of both materials.
+void choose_density_beyond(const Scene& scene, Plan& plan) {
+    constexpr double least_part = 0.05, clearly = 0.05;  // of the wood; of the way from EW to LW
+    if (!scene.specimen.map || scene.specimen.map->density.empty()) return;
+    const Specimen& map = *scene.specimen.map;
+    const double early = scene.materials.at("EW").density, late = scene.materials.at("LW").density;
+    std::size_t wood = 0, beyond = 0;
+    for (std::size_t i = 0; i < map.density.size(); ++i) {
+        if (map.label[i] == Specimen::void_label) continue;
+        const double way = (map.density[i] - early) / (late - early);
+        ++wood;
+        beyond += way < -clearly || way > 1.0 + clearly;
+    }
+    const double part = wood > 0 ? static_cast<double>(beyond) / static_cast<double>(wood) : 0.0;
+    if (part < least_part) return;
+    plan.choices.push_back({"wood beyond EW and LW", fmt::format("{:.2g} % of the picture's", 100.0 * part),
+                            "less dense than EW or denser than LW is: taken for these; see the materials' densities", true});
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretisation& body) {
@@ -521,6 +540,7 @@ Plan make_plan(const Scene& scene, const MaterialMap& materials, const Discretis
         (specimen.radial || specimen.pith || (specimen.picture && !specimen.picture->orientation.empty())))
         choose("radial direction", "not used", "all wood is isotropic");
     choose_wood_unseen(scene, plan, materials, body);
+    choose_density_beyond(scene, plan);
     if (const auto voids = thin_voids(scene, body)) plan.choices.push_back(*voids);
     choose_history(scene, plan, materials, body);
 

@@ -9,6 +9,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace crampfit {
@@ -81,6 +82,33 @@ bool drop_beyond_jump(std::vector<double>& at, std::vector<double>& change, doub
     return false;
 }
 
+// The slopes from below and from above (parabolas through 0 and both points there), where the function has a kink nearby: from
+// one stretch between points to the next its slope changes by turns much and little, and by more than this part of itself. A
+// smooth one's changes nearly evenly.
+std::optional<std::pair<double, double>> sides_of_kink(const std::vector<double>& at, const std::vector<double>& change) {
+    constexpr double uneven = 0.5, part = 0.01;
+    if (at.size() < points_a_parameter || at[0] * at[1] > 0) {
+        return std::nullopt;
+    }
+    const double h = at[1];
+    const std::array<double, points_a_parameter> slopes{(change[0] - change[2]) / h, -change[0] / h, change[1] / h,
+                                                        (change[3] - change[1]) / h};
+    std::array<double, points_a_parameter - 1> turns{};
+    double steepest = 0;
+    for (std::size_t k = 0; k < slopes.size(); ++k) {
+        steepest = std::max(steepest, std::abs(slopes[k]));
+        if (k > 0) {
+            turns[k - 1] = slopes[k] - slopes[k - 1];
+        }
+    }
+    const auto [least, most] = std::ranges::minmax(turns);
+    const double sharpest = std::max(std::abs(least), std::abs(most));
+    if (most - least <= uneven * sharpest || sharpest <= part * steepest) {
+        return std::nullopt;
+    }
+    return std::pair(1.5 * slopes[1] - 0.5 * slopes[0], 1.5 * slopes[2] - 0.5 * slopes[3]);
+}
+
 }  // namespace
 
 LocalDesign::LocalDesign(const Eigen::VectorXd& x) : points_{x} {
@@ -116,7 +144,12 @@ std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values, b
         const double value = slope(at, change);
         const std::size_t fewer = at.size() > 3 ? at.size() - 2 : at.size() - 1;
         const double error = std::abs(value - slope(std::span(at).first(fewer), std::span(change).first(fewer)));
-        derivatives.push_back({value, value - error, value + error});
+        Estimate estimate{value, value - error, value + error};
+        if (const auto sides = sides_of_kink(at, change)) {
+            const auto [low, high] = std::minmax(sides->first, sides->second);
+            estimate = {0.5 * (low + high), std::min(low, estimate.lower_95), std::max(high, estimate.upper_95)};
+        }
+        derivatives.push_back(estimate);
     }
     return derivatives;
 }

@@ -21,7 +21,8 @@ class LocalDesign {
     const std::vector<Eigen::VectorXd>& points() const { return points_; }
 
     /// Of the function's values at the points [points], the derivatives by x [parameters]. The interval is what two
-    /// points less would change: the polynomial's own error and the noise of the function. Points that are not a number
+    /// points less would change: the polynomial's own error and the noise of the function; where there is a kink among the
+    /// points, it takes in the slopes from both sides, and the derivative is their mean. Points that are not a number
     /// are left out, and so are those beyond a jump of the function, which is then told; not a number where less than three
     /// are left.
     std::vector<Estimate> derivatives(std::span<const double> values, bool* jumps = nullptr) const;

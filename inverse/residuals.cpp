@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -38,7 +39,7 @@ InputError bad_data(const Experiment& experiment, const std::string& key, const 
 }
 
 // A displacement that turns back leaves more than one force at it. Noise may turn it back a little.
-void check_rises(const Experiment& experiment, const std::vector<double>& abscissa, const char* column) {
+void check_rises(const Experiment& experiment, const std::vector<double>& abscissa, double noise, const char* column) {
     const bool is_time = std::string_view(column) == "time";
     const auto text = [&](double value) { return fmt::format("{:g} {}", (is_time ? 1 : 1e3) * value, is_time ? "s" : "mm"); };
     double low = INFINITY, high = -INFINITY, fall = 0;
@@ -57,7 +58,8 @@ void check_rises(const Experiment& experiment, const std::vector<double>& abscis
     if (high - low <= 0) {
         throw bad_data(experiment, column, text(low), "all rows that can be compared stand there: two or more must differ");
     }
-    if (fall > 0.05 * (high - low)) {
+    constexpr double clearly = 6.0;  // sigmas between the highest and the lowest of many rows at one place
+    if (fall > std::max(0.05 * (high - low), clearly * std::numbers::sqrt2 * noise)) {
         throw bad_data(experiment, column, fallen,
                        "must rise through the test, and falls by more than a twentieth of its range; fit a part that rises");
     }
@@ -86,6 +88,18 @@ double usual_step(const Curve& rows) {
         steps.push_back(std::abs(rows.y()[i + 1] - rows.y()[i]));
     }
     return median(std::move(steps));
+}
+
+// Of the curve from a twentieth of its range to the next, the median, whatever the noise of single rows.
+double usual_slope(const Curve& rows) {
+    constexpr int parts = 20;
+    const double from = rows.x().front(), width = (rows.x().back() - from) / parts;
+    std::vector<double> slopes;
+    for (int i = 0; i + 1 < parts && width > 0; ++i) {
+        const double middle = from + (i + 1) * width;
+        slopes.push_back(std::abs(rows.mean(middle, middle + width) - rows.mean(middle - width, middle)) / width);
+    }
+    return slopes.empty() ? 0.0 : median(std::move(slopes));
 }
 
 // How the crack grew from row to row: steadily, so that the line between two rows says when it came up to a length, or by a
@@ -354,7 +368,7 @@ void Comparison::add_curves(const Experiment& experiment) {
         tell_of_hold(experiment);
     }
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
-    check_rises(experiment, abscissa_, by_time_ ? "time" : "displacement");
+    check_rises(experiment, abscissa_, abscissa_noise_, by_time_ ? "time" : "displacement");
     if (abscissa_noise_ > 0) {
         noise_.push_back(by_time_ ? fmt::format("time {:.3g} s", abscissa_noise_)
                                   : fmt::format("displacement {:.3g} mm", 1e3 * abscissa_noise_));
@@ -425,10 +439,11 @@ double Comparison::noise_of(const Experiment& experiment, const char* what, cons
         noise_.push_back(fmt::format("{} {}", what, in_unit(*given)));
         constexpr std::size_t enough = 30;  // rows
         constexpr double too_much = 2;
-        if (const double seen = scatter(rows); rows.x().size() >= enough && seen > too_much * *given) {
+        const double explained = std::hypot(*given, abscissa_noise_ * usual_slope(rows));
+        if (const double seen = scatter(rows); rows.x().size() >= enough && seen > too_much * explained) {
             remarks_.push_back(
                 fmt::format("{}: the rows of {} scatter by {} about their neighbours, {:.2g} times the noise that is given.",
-                            experiment.name, what, in_unit(seen), seen / *given));
+                            experiment.name, what, in_unit(seen), seen / explained));
         }
         return *given;
     }

@@ -3,6 +3,7 @@
 
 #include "datasets/io.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -118,6 +119,39 @@ TEST(SystemSegment, ScaleGraysAndDensityAsTold) {
     ASSERT_EQ(dense.status, 0) << dense.error;
     EXPECT_TRUE(contains(dense.error, "density of LW")) << dense.error;
     EXPECT_EQ(read_specimen(specimen).density.size(), read_specimen(specimen).label.size());
+    // Its wood has 200 to 1200 kg/m^3.
+    const auto explained = [&](int early, int late) {
+        const std::string scene = fmt::format(R"(
+[model]
+plane = "stress"
+thickness = "10 mm"
+cell = "0.5 mm"
+[specimen]
+size = ["5 mm", "5 mm"]
+file = "s.h5"
+[materials]
+EW = {{ kind = "isotropic", E = "40 MPa", nu = 0.33, density = "{} kg/m^3", toughness = "100 J/m^2" }}
+LW = {{ kind = "isotropic", E = "400 MPa", nu = 0.33, density = "{} kg/m^3", toughness = "100 J/m^2" }}
+[[edges]]
+side = "top"
+velocity = ["0 m/s", "1 mm/min"]
+[[edges]]
+side = "bottom"
+velocity = ["0 m/s", "0 m/s"]
+[measure]
+force = "top"
+displacement = "top"
+[stop]
+displacement = "0.01 mm"
+)",
+                                              early, late);
+        return command.run({"explain", command.folder.write("dense.toml", scene).string()});
+    };
+    const Outcome narrow = explained(600, 620), wide = explained(200, 1200);
+    EXPECT_EQ(narrow.status, 0) << narrow.error;
+    EXPECT_TRUE(contains(narrow.out + narrow.error, "wood beyond EW and LW")) << narrow.out;
+    EXPECT_EQ(wide.status, 0) << wide.error;
+    EXPECT_FALSE(contains(wide.out + wide.error, "wood beyond EW and LW")) << wide.out;
     const auto refused = [&](const std::vector<std::string>& more, const std::string& phrase) {
         std::vector<std::string> words{"segment", picture, "-o", specimen};
         words.insert(words.end(), more.begin(), more.end());

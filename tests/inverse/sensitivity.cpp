@@ -235,6 +235,27 @@ TEST(GradientSensitivity, LocalDerivativesDoNotReachAcrossAJump) {
     EXPECT_FALSE(jumps);
 }
 
+// A kink at x or near it: the interval holds the slopes of both sides.
+TEST(GradientSensitivity, LocalDerivativesSeeAKink) {
+    const LocalDesign design(Eigen::VectorXd::Constant(1, 0.5));
+    for (const double at : {0.5, 0.497, 0.503, 0.4935, 0.505}) {
+        const auto f = [&](const Eigen::VectorXd& y) {
+            return 3.0 + 2.0 * y[0] + 0.05 * y[0] * y[0] + 0.7 * std::max(0.0, y[0] - at);
+        };
+        bool jumps = false;
+        const Estimate slope = design.derivatives(values_at(design, f), &jumps)[0];
+        EXPECT_FALSE(jumps) << at;
+        constexpr double rounding = 1e-9;
+        EXPECT_LT(slope.lower_95, (at > 0.5 ? 2.05 : 2.75) + rounding) << at;
+        EXPECT_GT(slope.upper_95, (at > 0.5 ? 2.05 : 2.75) - rounding) << at;
+        if (at == 0.5) {
+            EXPECT_NEAR(slope.value, 2.4, 1e-9);
+            EXPECT_NEAR(slope.upper_95 - slope.lower_95, 0.7, 0.25);
+            EXPECT_LT(slope.lower_95, 2.05 + rounding);
+        }
+    }
+}
+
 // Stands at 2 mm, jumps at 0.4 mm to 4 mm, stands to 0.8 mm, jumps to 6 mm and grows from there.
 Record staircase() {
     Record record;
@@ -409,6 +430,7 @@ TEST(SystemSensitivity, RunsThatTheUserStoppedHaveNotFailed) {
     std::atomic<bool> stop = false;
     int runs = 0;
     SensitivityOptions options;
+    options.threads = 1;  // else another may end well meanwhile
     options.stop_requested = &stop;
     options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
         Record record = FakeWedge{}(scene);
