@@ -1,6 +1,7 @@
 #include "imaging/ring_figures.hpp"
 
 #include "datasets/error.hpp"
+#include "imaging/quantile.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -63,6 +64,13 @@ struct RadialLine {
     }
 };
 
+/// Median distance of a polyline's vertices across the growth.
+double usual_spacing(const std::vector<cv::Point2d>& points) {
+    std::vector<float> spacings;
+    for (std::size_t i = 1; i < points.size(); ++i) spacings.push_back(static_cast<float>(points[i].x - points[i - 1].x));
+    return quantile(std::move(spacings), 0.5);
+}
+
 }  // namespace
 
 BorderPolyline polyline_of(const BorderLine& line, std::int64_t ring, const GrowthFrame& frame) {
@@ -85,15 +93,26 @@ BorderLine line_of(const BorderPolyline& polyline, const GrowthFrame& frame) {
     BorderLine line;
     line.first = std::max(0, static_cast<int>(std::ceil(points.front().x)));
     const int last = std::min(frame.size().width - 1, static_cast<int>(std::floor(points.back().x)));
-    if (last <= line.first) refuse("must run across the growth, within the picture");
+    const double usual = usual_spacing(points);
+    // Where a border leaves the picture and comes back on the same side there are no vertices.
+    const auto is_outside = [&](const cv::Point2d& a, const cv::Point2d& b) {
+        constexpr double many = 3, near = 10;  // spacings; pixels
+        const double highest = std::max(a.y, b.y), lowest = std::min(a.y, b.y);
+        return b.x - a.x > many * usual && (highest < near || lowest > frame.size().height - near);
+    };
     std::size_t next = 1;
     for (int u = line.first; u <= last; ++u) {
         while (next + 1 < points.size() && points[next].x < u) ++next;
         const cv::Point2d &a = points[next - 1], &b = points[next];
         const double v = b.x > a.x ? a.y + (u - a.x) / (b.x - a.x) * (b.y - a.y) : b.y;
-        if (!(v >= -0.5 && v <= frame.size().height - 0.5)) refuse("must lie within the picture");
-        line.v.push_back(std::clamp(v, 0.0, frame.size().height - 1.0));
+        const bool within = v >= -0.5 && v <= frame.size().height - 0.5 && (u == a.x || u == b.x || !is_outside(a, b));
+        line.v.push_back(within ? std::clamp(v, 0.0, frame.size().height - 1.0) : std::nan(""));
     }
+    while (!line.v.empty() && std::isnan(line.v.back())) line.v.pop_back();
+    const auto begins = std::ranges::find_if(line.v, [](double v) { return !std::isnan(v); });
+    line.first += static_cast<int>(begins - line.v.begin());
+    line.v.erase(line.v.begin(), begins);
+    if (line.v.size() < 2) refuse("must run across the growth, within the picture");
     return line;
 }
 

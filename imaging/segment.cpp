@@ -156,8 +156,11 @@ std::vector<BorderLine> lines_of(const std::vector<BorderPolyline>& borders, con
     for (const BorderPolyline& border : borders) lines.push_back(line_of(border, frame));
     refuse_crossing(borders, lines, frame);
     std::sort(lines.begin(), lines.end(), [](const BorderLine& a, const BorderLine& b) {
-        const int middle = (std::max(a.first, b.first) + std::min(a.end(), b.end())) / 2;
-        const auto at = [middle](const BorderLine& line) { return line.at(std::clamp(middle, line.first, line.end() - 1)); };
+        const int begin = std::max(a.first, b.first), end = std::min(a.end(), b.end()), middle = (begin + end) / 2;
+        for (int off = 0; off <= end - begin; ++off)
+            for (const int u : {middle - off, middle + off})
+                if (a.covers(u) && b.covers(u)) return a.at(u) < b.at(u);
+        const auto at = [middle](const BorderLine& line) { return line.at(middle < line.first ? line.first : line.end() - 1); };
         return at(a) < at(b);
     });
     return lines;

@@ -322,6 +322,34 @@ TEST(UnitSegment, BordersCorrectedByHandAreUsed) {
     }
 }
 
+// Borders that leave the picture and come back are the same when they are given as they were found.
+TEST(UnitSegment, BordersGivenAsTheyWereFoundAreTheSame) {
+    constexpr int columns = 300, rows = 300;
+    for (const auto& [pith, growth] : {std::pair(Eigen::Vector2d(-60, 150), GrowthAxis::right),
+                                       {Eigen::Vector2d(-60, 110), GrowthAxis::right},
+                                       {Eigen::Vector2d(150, 360), GrowthAxis::up}}) {
+        cv::Mat pixels(rows, columns, CV_8U);
+        cv::RNG random(4);
+        for (int y = 0; y < rows; ++y)
+            for (int x = 0; x < columns; ++x) {
+                const double turns = std::hypot(x - pith.x(), y - pith.y()) / 50;
+                const double gray = turns - std::floor(turns) > 0.65 ? 80 : 180;
+                pixels.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(gray + random.gaussian(6));
+            }
+        SegmentOptions options;
+        options.growth = growth;
+        const Specimen found = segment_pixels(pixels, options).specimen;
+        ASSERT_GE(found.borders.size(), 4u);
+        options.borders = found.borders;
+        const Specimen given = segment_pixels(pixels, options).specimen;
+        ASSERT_EQ(given.rings.size(), found.rings.size());
+        for (std::size_t i = 0; i < found.rings.size(); ++i) {
+            EXPECT_NEAR(given.rings[i].width / found.rings[i].width, 1, 0.005) << i;
+            EXPECT_NEAR(given.rings[i].latewood_fraction, found.rings[i].latewood_fraction, 0.01) << i;
+        }
+    }
+}
+
 TEST(UnitSegment, ThreeClassesHaveTransitionWoodBetweenTheOthers) {
     EndGrainOptions block;
     block.transition = 0.6e-3;
