@@ -437,6 +437,31 @@ std::array<Vec2, 3> model_errors(const std::vector<Sample>& samples, const Line&
             share * move_with<other>(samples, line, subset, ring)};
 }
 
+/// Standard deviation of the tip's place along its line by how likely each place on it is, the line held: where a crack is hardly
+/// open, places far from the best one explain the field about as well, and the curvature there does not know [px].
+template <int count>
+double spread_along(const std::vector<Sample>& samples, const Line& line, int subset, double overlap) {
+    const double ring = ring_subsets * subset, step = 0.25 * subset;
+    const auto at = [&](double way) { return Line{line.tip + way * line.direction(), line.angle}; };
+    // The same points for all places: those clear of the longest crack.
+    const std::vector<Sample> clear = clear_of(within(samples, line.tip, ring), at(ring), subset);
+    const double freedom = 2.0 * static_cast<double>(clear.size()) - 2 * count - 2;
+    if (static_cast<int>(clear.size()) < least_points<count>) return 0.0;
+    std::vector<std::pair<double, double>> places;  // way, misfit
+    double least = std::numeric_limits<double>::infinity();
+    for (double way = -ring; way <= ring; way += step) {
+        places.emplace_back(way, residuals<count>(clear, at(way)).squaredNorm());
+        least = std::min(least, places.back().second);
+    }
+    double weights = 0, squares = 0;
+    for (const auto& [way, left] : places) {
+        const double weight = std::exp(-0.5 * (left / least - 1) * freedom / overlap);
+        weights += weight;
+        squares += weight * way * way;
+    }
+    return std::sqrt(squares / weights);
+}
+
 /// Length of the crack's line from the picture's border to the tip [px].
 double length_in_picture(const Line& line, int columns, int rows) {
     const Vec2 back = -line.direction();
@@ -545,8 +570,10 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         for (const Vec2& move : moves) square += by.dot(move) * by.dot(move);
         return std::sqrt(square);
     };
-    found.tip_sigma = error(line.direction());
-    found.sigma = std::hypot(error(by_tip), turn_error);
+    const double spread = goes_on ? spread_along<more_terms>(samples, line, geometry.subset, overlap)
+                                  : spread_along<terms>(samples, line, geometry.subset, overlap);
+    found.tip_sigma = std::max(error(line.direction()), spread);
+    found.sigma = std::max(std::hypot(error(by_tip), turn_error), spread);
     return found;
 }
 
