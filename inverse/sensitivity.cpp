@@ -1,6 +1,7 @@
 #include "inverse/sensitivity.hpp"
 
 #include "datasets/error.hpp"
+#include "datasets/io.hpp"
 #include "inverse/kept_walks.hpp"
 #include "inverse/local_design.hpp"
 #include "inverse/morris.hpp"
@@ -14,11 +15,15 @@
 #include "inverse/walk_slopes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
 
 namespace crampfit {
 namespace {
@@ -93,28 +98,41 @@ void add_local(Indices& indices, std::size_t output, const UnitBox& box, const s
     indices.add(output, "elasticity", scaled(by_si, relative));
 }
 
-// By differences of whole runs. Whether the output jumps among them.
+// Of one output by each parameter in SI; the interval spans what is seen from either side.
+std::vector<Estimate> estimates_of(const WalkSlopes& slopes, std::size_t output) {
+    const auto row = static_cast<Eigen::Index>(output);
+    std::vector<Estimate> by_si;
+    for (Eigen::Index j = 0; j < slopes.from_below.cols(); ++j) {
+        const double below = slopes.from_below(row, j), above = slopes.from_above(row, j);
+        by_si.push_back({0.5 * (below + above), below, above});
+    }
+    return by_si;
+}
+
+/// Derivatives that one run's walk has, by some parameters: their numbers in the study, and those at the initial point.
+struct ExactSlopes {
+    std::vector<std::size_t> parameters;
+    std::function<std::optional<WalkSlopes>()> at_initial;
+};
+
+// By differences of whole runs, but for parameters by which they are known. Whether the output jumps among them.
 bool add_differences(Indices& indices, std::size_t output, const UnitBox& box, const LocalDesign& design,
-                     const std::vector<double>& values) {
+                     const std::vector<double>& values, const ExactSlopes& exact, const std::optional<WalkSlopes>& slopes) {
     const Eigen::VectorXd& x = design.points().front();
     std::vector<double> to_si;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         to_si.push_back(1.0 / box.slope(j, x[j]));
     }
     bool jumps = false;
-    add_local(indices, output, box, scaled(design.derivatives(values, &jumps), to_si), values.front());
-    return jumps;
-}
-
-// On the walk of one run; the interval spans what is seen from either side.
-void add_slopes(Indices& indices, std::size_t output, const UnitBox& box, const WalkSlopes& slopes, double value) {
-    const auto row = static_cast<Eigen::Index>(output);
-    std::vector<Estimate> by_si;
-    for (Eigen::Index j = 0; j < box.size(); ++j) {
-        const double below = slopes.from_below(row, j), above = slopes.from_above(row, j);
-        by_si.push_back({0.5 * (below + above), below, above});
+    std::vector<Estimate> by_si = scaled(design.derivatives(values, &jumps), to_si);
+    if (slopes) {
+        const std::vector<Estimate> known = estimates_of(*slopes, output);
+        for (std::size_t k = 0; k < known.size(); ++k) {
+            by_si[exact.parameters[k]] = known[k];
+        }
     }
-    add_local(indices, output, box, by_si, value);
+    add_local(indices, output, box, by_si, values.front());
+    return jumps;
 }
 
 std::optional<WalkSlopes> slopes_at(const Study& study, const KeptWalks& walks, const Eigen::VectorXd& values,
@@ -123,11 +141,26 @@ std::optional<WalkSlopes> slopes_at(const Study& study, const KeptWalks& walks, 
     return walk_slopes([&](const Eigen::VectorXd& v) { return near.at(v, 1); }, values, study.parameters);
 }
 
-using Slopes = std::function<std::optional<WalkSlopes>()>;
+// The same study of those parameters alone that stand for numbers of the wood; the others have their initial values.
+std::pair<Study, std::vector<std::size_t>> of_wood_alone(const Study& study) {
+    std::pair<Study, std::vector<std::size_t>> part{study, {}};
+    part.first.parameters.clear();
+    for (std::size_t j = 0; j < study.parameters.size(); ++j) {
+        const Parameter& parameter = study.parameters[j];
+        if (std::ranges::all_of(parameter.keys, [](const std::string& key) { return key.starts_with("materials."); })) {
+            part.first.parameters.push_back(parameter);
+            part.second.push_back(j);
+            continue;
+        }
+        for (std::size_t k = 0; k < parameter.keys.size(); ++k) {
+            set_number(*part.first.scene, parameter.keys[k], parameter.factor(k) * parameter.initial);
+        }
+    }
+    return part;
+}
 
-// Runs what the method asks for, and makes of it what it gives. `slopes` are the derivatives at the initial point; empty where
-// the solver has none.
-void apply_method(const Study& study, const UnitBox& box, Objective& objective, const Slopes& slopes, unsigned seed,
+// Runs what the method asks for, and makes of it what it gives.
+void apply_method(const Study& study, const UnitBox& box, Objective& objective, const ExactSlopes& exact, unsigned seed,
                   Sensitivity& result) {
     const int samples = study.sensitivity.samples;
     Indices indices(result, study.sensitivity.method);
@@ -139,18 +172,18 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
     };
     switch (study.sensitivity.method) {
     case SensitivityMethod::local: {
-        if (slopes) {
-            const std::optional<WalkSlopes> exact = slopes();
+        const std::optional<WalkSlopes> slopes = exact.at_initial ? exact.at_initial() : std::nullopt;
+        if (exact.parameters.size() == study.parameters.size()) {
             for_each_output({box.initial()}, [&](std::size_t k, const std::vector<double>& values) {
-                if (exact) {
-                    add_slopes(indices, k, box, *exact, values.front());
+                if (slopes) {
+                    add_local(indices, k, box, estimates_of(*slopes, k), values.front());
                 }
             });
             break;
         }
         const LocalDesign design(box.initial());
         for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
-            if (add_differences(indices, k, box, design, values)) {
+            if (add_differences(indices, k, box, design, values, exact, slopes)) {
                 result.message +=
                     fmt::format("; '{}' jumps near the initial point, its derivatives are told from one side of that",
                                 result.outputs[k].name);
@@ -269,9 +302,26 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     const Forward forward = !own ? options.forward : in_order ? walks.exact() : walks.in_any_order();
     const OutputModel model(study, forward, options.stop_requested);
     const int threads = thread_count(options.threads);
-    Slopes slopes;
-    if (own && walks.has_exact_slopes()) {
-        slopes = [&] { return slopes_at(study, walks, model.box().values(model.box().initial()), options.stop_requested); };
+    ExactSlopes exact;
+    const bool is_local = own && study.sensitivity.method == SensitivityMethod::local;
+    const bool all_exact = is_local && walks.has_exact_slopes();
+    std::pair<Study, std::vector<std::size_t>> part;
+    std::optional<KeptWalks> part_walks;
+    if (all_exact) {
+        exact.parameters.resize(study.parameters.size());
+        std::iota(exact.parameters.begin(), exact.parameters.end(), std::size_t{0});
+        exact.at_initial = [&] {
+            return slopes_at(study, walks, model.box().values(model.box().initial()), options.stop_requested);
+        };
+    } else if (is_local && study.scene) {
+        part = of_wood_alone(study);
+        if (!part.second.empty() && part_walks.emplace(part.first).has_exact_slopes()) {
+            exact.parameters = part.second;
+            exact.at_initial = [&] {
+                const UnitBox box(part.first.parameters);
+                return slopes_at(part.first, *part_walks, box.values(box.initial()), options.stop_requested);
+            };
+        }
     }
     Sensitivity result;
     result.seed = options.seed;
@@ -281,7 +331,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     fill_parameters(model.box(), result);
 
     SensitivityProgress progress;
-    progress.planned = runs_of(study, slopes != nullptr);
+    progress.planned = runs_of(study, all_exact);
     Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); },
                    threads, in_order ? nullptr : options.farm);
     RunStore store(options.keeping, study, options.stop_requested);
@@ -300,11 +350,18 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
                 options.progress(progress);
             }
         });
-    apply_method(study, model.box(), objective, slopes, options.seed, result);
+    apply_method(study, model.box(), objective, exact, options.seed, result);
     fill_runs(model.box(), objective.runs(), result);
     conclude(objective.runs(), study.sensitivity.method, objective.stopped(), result);
-    if (slopes && !result.indices.empty() && study.sensitivity.method == SensitivityMethod::local) {
-        result.message += "; derivatives are exact, by the solver";
+    if (exact.at_initial && !result.indices.empty()) {
+        std::vector<std::string> names;
+        for (const std::size_t j : exact.parameters) {
+            names.push_back("'" + study.parameters[j].name + "'");
+        }
+        result.message += all_exact
+                              ? "; derivatives are exact, by the solver"
+                              : fmt::format("; derivatives by {} are exact, by the solver, the others by differences of runs",
+                                            fmt::join(names, ", "));
     }
     if (std::ranges::any_of(study.parameters, [](const Parameter& parameter) { return parameter.prior.has_value(); })) {
         result.message += "; priors do not count, parameters go evenly over their box";

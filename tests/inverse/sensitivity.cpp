@@ -424,6 +424,34 @@ displacement = "1.2 mm"
     }
 }
 
+// A parameter without exact derivatives leaves the others theirs.
+TEST(GradientSensitivity, ExactDerivativesStayBesideOthers) {
+    Study study;
+    study.scene = bar_scene();
+    study.parameters = {bar_modulus()};
+    study.outputs = {{"peak force", StudyOutput::Kind::peak_force, 0, 0}};
+    study.sensitivity = {SensitivityMethod::local, 0};
+    const Sensitivity alone = study_sensitivity(study, {});
+    Parameter thickness = bar_modulus();
+    thickness.name = "thickness";
+    thickness.keys = {"model.thickness"};
+    thickness.initial = 10e-3;
+    thickness.lower = 5e-3;
+    thickness.upper = 20e-3;
+    study.parameters.insert(study.parameters.begin(), thickness);
+    const Sensitivity both = study_sensitivity(study, {});
+    EXPECT_NE(both.message.find("derivatives by 'E' are exact"), std::string::npos) << both.message;
+    const auto of = [](const Sensitivity& result, const char* parameter) {
+        return *std::ranges::find_if(result.indices, [&](const SensitivityIndex& index) {
+            return index.parameter == parameter && index.kind == "elasticity";
+        });
+    };
+    EXPECT_EQ(of(both, "E").value, of(alone, "E").value);
+    EXPECT_EQ(of(both, "E").upper_95, of(alone, "E").upper_95);
+    EXPECT_NEAR(of(both, "E").value, 1, 1e-6);
+    EXPECT_NEAR(of(both, "thickness").value, 1, 1e-6);
+}
+
 // A run that the user ends is none that failed.
 TEST(SystemSensitivity, RunsThatTheUserStoppedHaveNotFailed) {
     const Study study = output_study(SensitivityMethod::sobol, 64);
