@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace crampfit {
 namespace {
@@ -245,6 +246,7 @@ Profiled take_profile(CloseLook& look, const Uncertainty& closer,
     const bool told = all_told(u);
     double least = look.objective.best()->evaluation->misfit;
     Eigen::VectorXd lower(u.lower_95.size()), upper(u.lower_95.size());
+    std::vector<Run> seen;  // on all ways, in the box
     for (Eigen::Index j = 0; j < lower.size(); ++j) {
         const double level = u.rise[j];
         CloseLook::Along way = look.along(j);
@@ -294,6 +296,11 @@ Profiled take_profile(CloseLook& look, const Uncertainty& closer,
         // The model's own scatter, which no profile of it shows, comes on top.
         lower[j] = std::max(0.0, u.best.x[j] - std::hypot(below, own));
         upper[j] = std::min(1.0, u.best.x[j] + std::hypot(above, own));
+        const std::vector<Run> on_way = way.seen();
+        seen.insert(seen.end(), on_way.begin(), on_way.end());
+    }
+    for (Eigen::Index j = 0; j < lower.size(); ++j) {
+        std::tie(lower[j], upper[j]) = holding(seen, least, u.rise[j], j, lower[j], upper[j]);
     }
     if (told) {
         // A descent that stays above its lowest point makes a profile narrow, never wide: a parabola that is there has its say.
@@ -342,7 +349,29 @@ CloseLook::Along CloseLook::along(Eigen::Index parameter) const {
             Objective(objective.parameters(), evaluate, std::numeric_limits<int>::max(), objective.threads(), objective.stop()),
             {along.share(uncertainty.best.x), uncertainty.best.evaluation},
             inverse * uncertainty.covariance * inverse.transpose(),
-            inverse.col(parameter) / inverse(0, parameter)};
+            inverse.col(parameter) / inverse(0, parameter),
+            is_exact};
+}
+
+std::vector<Run> CloseLook::Along::seen() const {
+    std::vector<Run> runs;
+    for (const Run& run : objective.runs()) {
+        if (is_exact && run.evaluation->usable()) {
+            runs.push_back({in_box(window.inside(run.x)), run.evaluation});
+        }
+    }
+    return runs;
+}
+
+std::pair<double, double> holding(const std::vector<Run>& runs, double least, double rise, Eigen::Index j, double lower,
+                                  double upper) {
+    for (const Run& run : runs) {
+        if (run.evaluation->misfit <= least + rise) {
+            lower = std::min(lower, run.x[j]);
+            upper = std::max(upper, run.x[j]);
+        }
+    }
+    return {lower, upper};
 }
 
 std::optional<CloseLook> look_close(Objective& objective, const NearRuns& near, const Eigen::VectorXd& x,

@@ -27,9 +27,18 @@ struct CloseLook {
         Run best;                    // of the window
         Eigen::MatrixXd covariance;  // the same
         Eigen::VectorXd alone;       // how its coordinates go with the first while the other parameters stay
+        bool is_exact;
+
+        /// Its usable runs so far, in the box; none where they are not exact.
+        std::vector<Run> seen() const;
     };
     Along along(Eigen::Index parameter) const;
 };
+
+/// An interval of parameter j that holds what runs, of any parameter's profile, have found to be within `rise` of the least
+/// misfit.
+std::pair<double, double> holding(const std::vector<Run>& runs, double least, double rise, Eigen::Index j, double lower,
+                                  double upper);
 
 /// Cheap runs near a point of the box.
 struct NearRuns {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <tuple>
 
 namespace crampfit {
 namespace {
@@ -75,6 +76,8 @@ Exploration explore(Objective& objective, CloseLook* close, const Uncertainty& u
                     x = std::clamp(way.window.origin[j] + x * way.window.axes(j, 0), 0.0, 1.0);
                 }
                 result.profiles.push_back(profile);
+                const std::vector<Run> seen = way.seen();
+                result.seen.insert(result.seen.end(), seen.begin(), seen.end());
             } else {
                 model.set_budget_left(runs_of_a_profile);
                 const double half_width = uncertainty.quantile * std::sqrt(uncertainty.covariance(j, j));
@@ -124,7 +127,8 @@ void fill_exploration(Fit& fit, const UnitBox& box, const Uncertainty& uncertain
             fit.profile.push_back({parameter.name, value_at(profile.x[i]), profile.misfit[i]});
         }
         const double least = *std::min_element(profile.misfit.begin(), profile.misfit.end());
-        const auto [lower, upper] = interval(profile, least, uncertainty.rise[k]);
+        auto [lower, upper] = interval(profile, least, uncertainty.rise[k]);
+        std::tie(lower, upper) = holding(exploration.seen, least, uncertainty.rise[k], k, lower, upper);
         // The model's own scatter, which no profile of it shows, comes on top.
         const double x = uncertainty.best.x[k];
         const double own = uncertainty.quantile * std::sqrt(uncertainty.model_variance[k]);

@@ -18,6 +18,7 @@ namespace crampfit {
 /// What the study asks to know about the surroundings of the best point, beyond its covariance.
 struct Exploration {
     std::vector<Profile> profiles;  // [parameters], of the box; empty where not asked for
+    std::vector<Run> seen;          // on all their ways, of the box; empty where runs nearby are not exact
     Ensemble posterior;             // the same
     std::string message;
 };
