@@ -194,6 +194,18 @@ struct Ground {
     double most_scatter() const { return 2 * noise + 0.008; }
 };
 
+/// Of the 25 pixels about each.
+cv::Mat local_mean(const cv::Mat& gray) {
+    cv::Mat mean;
+    cv::blur(gray, mean, {5, 5});
+    return mean;
+}
+
+cv::Mat local_variance(const cv::Mat& gray) {
+    const cv::Mat mean = local_mean(gray);
+    return local_mean(gray.mul(gray)) - mean.mul(mean);
+}
+
 /// The ground that at least three of a picture's corners show: two may lie in the same ring.
 std::optional<Ground> ground_in_corners(const cv::Mat& gray) {
     constexpr int side = 9, least_corners = 3;
@@ -218,10 +230,7 @@ std::optional<Ground> ground_in_corners(const cv::Mat& gray) {
 
 double noise_of_black(const cv::Mat& gray, double black) {
     constexpr double most_even = 0.1;
-    cv::Mat mean, squares;
-    cv::blur(gray, mean, {5, 5});
-    cv::blur(gray.mul(gray), squares, {5, 5});
-    const cv::Mat variance = squares - mean.mul(mean);
+    const cv::Mat mean = local_mean(gray), variance = local_variance(gray);
     std::vector<float> there;
     for (int v = 2; v < gray.rows - 2; ++v)
         for (int u = 2; u < gray.cols - 2; ++u)
@@ -233,10 +242,7 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black, double
     constexpr double most_scatter = 1.8;  // of what its most even tenth has: of 25 pixels nearly all have less
     constexpr double apart = 0.03;        // beyond the limit of black or white: another gray for sure
     constexpr double rim = 0.1;           // EW may be as white as the ground, LW is not
-    cv::Mat mean, squares;
-    cv::blur(gray, mean, {5, 5});
-    cv::blur(gray.mul(gray), squares, {5, 5});
-    const cv::Mat even = squares - mean.mul(mean) < std::pow(std::max(blank_grain, most_scatter * noise), 2);
+    const cv::Mat even = local_variance(gray) < std::pow(std::max(blank_grain, most_scatter * noise), 2);
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
     for (const bool dark : {true, false}) {
         cv::Mat colour;
@@ -259,14 +265,11 @@ cv::Mat find_ground(const cv::Mat& gray) {
     cv::Mat none = cv::Mat::zeros(gray.size(), CV_8U);
     const std::optional<Ground> ground = ground_in_corners(gray);
     if (!ground) return none;
-    cv::Mat mean, squares;
-    cv::blur(gray, mean, {5, 5});
-    cv::blur(gray.mul(gray), squares, {5, 5});
-    const cv::Mat off = cv::abs(mean - ground->gray);
-    const cv::Mat plain = (off < ground->tolerance()) & (squares - mean.mul(mean) < std::pow(ground->most_scatter(), 2));
+    const cv::Mat off = cv::abs(local_mean(gray) - ground->gray);
+    const cv::Mat plain = (off < ground->tolerance()) & (local_variance(gray) < std::pow(ground->most_scatter(), 2));
     cv::Mat around = around_something(plain, off > ground->tolerance() + apart, rim);
     // Over a larger stretch noise is gone, and what is left of wood is its mottle and the light on it.
-    cv::Mat inside;
+    cv::Mat inside, mean;
     cv::erode(around, inside, disk(8));
     cv::Scalar middle, drift;
     cv::blur(gray, mean, {15, 15});

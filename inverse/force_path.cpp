@@ -7,6 +7,7 @@
 #include <limits>
 
 namespace crampfit {
+
 ForcePath::ForcePath(const std::vector<double>& lengths, const std::vector<double>& forces, double length_noise,
                      double force_noise)
     : noise_(length_noise, force_noise) {

@@ -111,8 +111,12 @@ std::optional<std::pair<double, double>> sides_of_kink(const std::vector<double>
 
 }  // namespace
 
-LocalDesign::LocalDesign(const Eigen::VectorXd& x) : points_{x} {
+LocalDesign::LocalDesign(const Eigen::VectorXd& x, const std::vector<std::size_t>& left_out) : points_{x} {
     for (Eigen::Index j = 0; j < x.size(); ++j) {
+        if (std::ranges::find(left_out, static_cast<std::size_t>(j)) != left_out.end()) {
+            continue;
+        }
+        parameters_.push_back(static_cast<std::size_t>(j));
         for (const double offset : offsets(x[j])) {
             points_.push_back(x);
             points_.back()[j] += offset;
@@ -122,11 +126,12 @@ LocalDesign::LocalDesign(const Eigen::VectorXd& x) : points_{x} {
 
 std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values, bool* jumps) const {
     assert(values.size() == points_.size());
-    std::vector<Estimate> derivatives;
-    const auto parameters = static_cast<std::size_t>(points_.front().size());
-    for (std::size_t j = 0; j < parameters; ++j) {
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    std::vector<Estimate> derivatives(static_cast<std::size_t>(points_.front().size()), {unknown, unknown, unknown});
+    for (std::size_t number = 0; number < parameters_.size(); ++number) {
+        const std::size_t j = parameters_[number];
         std::vector<double> at, change;
-        for (std::size_t k = 1 + j * points_a_parameter; k < 1 + (j + 1) * points_a_parameter; ++k) {
+        for (std::size_t k = 1 + number * points_a_parameter; k < 1 + (number + 1) * points_a_parameter; ++k) {
             if (std::isfinite(values[k] - values[0])) {
                 at.push_back((points_[k] - points_[0])[static_cast<Eigen::Index>(j)]);
                 change.push_back(values[k] - values[0]);
@@ -137,8 +142,6 @@ std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values, b
             *jumps = *jumps || jumped;
         }
         if (at.size() < 2) {
-            constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-            derivatives.push_back({unknown, unknown, unknown});
             continue;
         }
         const double value = slope(at, change);
@@ -149,7 +152,7 @@ std::vector<Estimate> LocalDesign::derivatives(std::span<const double> values, b
             const auto [low, high] = std::minmax(sides->first, sides->second);
             estimate = {0.5 * (low + high), std::min(low, estimate.lower_95), std::max(high, estimate.upper_95)};
         }
-        derivatives.push_back(estimate);
+        derivatives[j] = estimate;
     }
     return derivatives;
 }

@@ -181,7 +181,7 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
             });
             break;
         }
-        const LocalDesign design(box.initial());
+        const LocalDesign design(box.initial(), exact.parameters);
         for_each_output(design.points(), [&](std::size_t k, const std::vector<double>& values) {
             if (add_differences(indices, k, box, design, values, exact, slopes)) {
                 result.message +=
@@ -216,12 +216,12 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
 }
 
 // How many runs the method takes, those at the same point counted each time.
-int runs_of(const Study& study, bool has_slopes) {
+int runs_of(const Study& study, std::size_t exact) {
     const int p = static_cast<int>(study.parameters.size());
     const int samples = study.sensitivity.samples;
     switch (study.sensitivity.method) {
     case SensitivityMethod::local:
-        return has_slopes ? 1 : 1 + 4 * p;
+        return 1 + 4 * (p - static_cast<int>(exact));
     case SensitivityMethod::morris:
         return (samples > 0 ? samples : default_trajectories) * (p + 1);
     case SensitivityMethod::sobol:
@@ -331,7 +331,7 @@ Sensitivity study_sensitivity(const Study& study, const SensitivityOptions& opti
     fill_parameters(model.box(), result);
 
     SensitivityProgress progress;
-    progress.planned = runs_of(study, all_exact);
+    progress.planned = runs_of(study, exact.parameters.size());
     Sharing shared([&](const Eigen::VectorXd& values, int share) { return model.at(values, in_order ? threads : share); },
                    threads, in_order ? nullptr : options.farm);
     RunStore store(options.keeping, study, options.stop_requested);

@@ -23,6 +23,17 @@ std::vector<std::string> lines_of(const std::string& text) {
     return lines;
 }
 
+// The sample's scene with the specimen in place of its picture.
+std::string scene_on_specimen() {
+    std::ifstream sample(std::string(SAMPLES) + "/tension_tr_plus.toml");
+    std::string scene;
+    for (std::string line; std::getline(sample, line);) {
+        if (line.rfind("pixel =", 0) == 0 || line.rfind("classes =", 0) == 0 || line.rfind("between =", 0) == 0) continue;
+        scene += (line.rfind("image =", 0) == 0 ? "file = \"s.h5\"" : line) + '\n';
+    }
+    return scene;
+}
+
 }  // namespace
 
 TEST(SystemSegment, PictureToTablesAndBackThroughEditedBorders) {
@@ -58,13 +69,7 @@ TEST(SystemSegment, PictureToTablesAndBackThroughEditedBorders) {
 TEST(SystemSegment, ASceneStandsOnTheSpecimen) {
     Command command;
     ASSERT_EQ(command.run({"segment", picture, "-o", command.path("s.h5"), "--pixel", "25 um", "--quiet"}).status, 0);
-    std::ifstream sample(std::string(SAMPLES) + "/tension_tr_plus.toml");
-    std::string scene;
-    for (std::string line; std::getline(sample, line);) {
-        if (line.rfind("pixel =", 0) == 0 || line.rfind("classes =", 0) == 0 || line.rfind("between =", 0) == 0) continue;
-        scene += (line.rfind("image =", 0) == 0 ? "file = \"s.h5\"" : line) + '\n';
-    }
-    command.folder.write("scene.toml", scene);
+    command.folder.write("scene.toml", scene_on_specimen());
     const Outcome run = command.run({"simulate", command.path("scene.toml"), "-o", command.path("r.h5"), "--set",
                                      "model.cell=0.5 mm", "--set", "edges.top.velocity=[\"0 m/s\", \"1 mm/min\"]"});
     ASSERT_EQ(run.status, 0) << run.error;
@@ -120,32 +125,11 @@ TEST(SystemSegment, ScaleGraysAndDensityAsTold) {
     EXPECT_TRUE(contains(dense.error, "density of LW")) << dense.error;
     EXPECT_EQ(read_specimen(specimen).density.size(), read_specimen(specimen).label.size());
     // Its wood has 200 to 1200 kg/m^3.
+    const std::string scene = command.folder.write("scene.toml", scene_on_specimen()).string();
     const auto explained = [&](int early, int late) {
-        const std::string scene = fmt::format(R"(
-[model]
-plane = "stress"
-thickness = "10 mm"
-cell = "0.5 mm"
-[specimen]
-size = ["5 mm", "5 mm"]
-file = "s.h5"
-[materials]
-EW = {{ kind = "isotropic", E = "40 MPa", nu = 0.33, density = "{} kg/m^3", toughness = "100 J/m^2" }}
-LW = {{ kind = "isotropic", E = "400 MPa", nu = 0.33, density = "{} kg/m^3", toughness = "100 J/m^2" }}
-[[edges]]
-side = "top"
-velocity = ["0 m/s", "1 mm/min"]
-[[edges]]
-side = "bottom"
-velocity = ["0 m/s", "0 m/s"]
-[measure]
-force = "top"
-displacement = "top"
-[stop]
-displacement = "0.01 mm"
-)",
-                                              early, late);
-        return command.run({"explain", command.folder.write("dense.toml", scene).string()});
+        return command.run({"explain", scene, "--set", "model.cell=0.5 mm", "--set",
+                            fmt::format("materials.EW.density={} kg/m^3", early), "--set",
+                            fmt::format("materials.LW.density={} kg/m^3", late)});
     };
     const Outcome narrow = explained(600, 620), wide = explained(200, 1200);
     EXPECT_EQ(narrow.status, 0) << narrow.error;

@@ -587,6 +587,28 @@ TEST(UnitResiduals, NoiseThatIsGivenFarTooSmallIsTold) {
     }
 }
 
+// Noise of the displacement makes forces scatter about their neighbours, and displacements fall back: what the study states of it
+// is no contradiction.
+TEST(UnitResiduals, StatedNoiseOfTheDisplacementExplainsScatterAndFalls) {
+    Experiment experiment = straight_experiment();
+    experiment.data = measure(straight(1e5, 8, 1e-3), 2.0, 0, 7);
+    experiment.data.crack_length.clear();
+    experiment.noise = {.force = 2.0, .crack_length = {}, .displacement = 0.02e-3, .time = {}};
+    std::mt19937 generator(3);
+    std::normal_distribution<double> normal;
+    for (double& displacement : experiment.data.displacement) {
+        displacement += 0.02e-3 * normal(generator);
+    }
+    const auto is_told = [](const Comparison& comparison) {
+        return std::ranges::any_of(comparison.remarks(), [](const std::string& remark) {
+            return remark.find("about their neighbours") != std::string::npos;
+        });
+    };
+    EXPECT_FALSE(is_told(Comparison(experiment)));
+    experiment.noise.displacement = 0.1e-6;
+    EXPECT_THROW(Comparison{experiment}, InputError);  // falls by more than a twentieth
+}
+
 // That a crack stands says how tough the wood is at the least.
 TEST(UnitResiduals, ACrackThatStandsIsComparedByItsLength) {
     Experiment experiment = straight_experiment();

@@ -446,6 +446,7 @@ TEST(GradientSensitivity, ExactDerivativesStayBesideOthers) {
             return index.parameter == parameter && index.kind == "elasticity";
         });
     };
+    EXPECT_EQ(both.runs.size(), 5U);  // four for the thickness
     EXPECT_EQ(of(both, "E").value, of(alone, "E").value);
     EXPECT_EQ(of(both, "E").upper_95, of(alone, "E").upper_95);
     EXPECT_NEAR(of(both, "E").value, 1, 1e-6);
