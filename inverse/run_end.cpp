@@ -180,8 +180,8 @@ void cut_longer_rows(const Experiment& test, CoveredData& covered) {
     }
     if (left_out > 0) {
         covered.remark = fmt::format(
-            "{}: stop.crack_length = {} ends the runs before the data, whose crack grows to {:.4g} mm: {} rows with a longer "
-            "crack are left out; a later stop would take them in.",
+            "{}: stop.crack_length = {} ends the runs before the data, whose crack grows to {:.4g} mm: rows with a longer crack "
+            "({}) are left out; a later stop would take them in.",
             test.name, stop_text, 1e3 * longest, left_out);
     }
 }
