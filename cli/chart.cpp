@@ -157,8 +157,10 @@ class Drawing {
         const double top = title_height + legend_line * lines + 8;
         x_.from = left_;
         x_.to = left_ + wide;
-        y_.from = top + high;
-        y_.to = top;
+        ceiling_ = top;
+        floor_ = top + high;
+        y_.from = chart_.y_down ? ceiling_ : floor_;
+        y_.to = chart_.y_down ? floor_ : ceiling_;
         width_ = left_ + plot_width + margin_right;
         height_ = top + high + margin_bottom;
     }
@@ -203,9 +205,9 @@ class Drawing {
         const std::vector<double> x_ticks = linear_ticks(x_, 6);
         const bool grid = chart_.pictures.empty();
         for (const double tick : x_ticks) {
-            if (grid) line(x_.at(tick), y_.from, x_.at(tick), y_.to, "#ececec");
-            line(x_.at(tick), y_.from, x_.at(tick), y_.from + 4, "#555");
-            svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", x_.at(tick), y_.from + 16,
+            if (grid) line(x_.at(tick), floor_, x_.at(tick), ceiling_, "#ececec");
+            line(x_.at(tick), floor_, x_.at(tick), floor_ + 4, "#555");
+            svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", x_.at(tick), floor_ + 16,
                                 number_text(tick, x_.high - x_.low));
         }
         for (const double tick : y_ticks()) {
@@ -216,13 +218,13 @@ class Drawing {
         }
         for (const double level : chart_.x_levels)
             if (level >= x_.low && level <= x_.high)
-                line(x_.at(level), y_.from, x_.at(level), y_.to, colour::gray, " stroke-dasharray=\"4 3\"");
+                line(x_.at(level), floor_, x_.at(level), ceiling_, colour::gray, " stroke-dasharray=\"4 3\"");
         for (const double level : chart_.y_levels)
             line(x_.from, y_.at(level), x_.to, y_.at(level), colour::gray, " stroke-dasharray=\"4 3\"");
-        svg_ += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\" fill=\"none\" stroke=\"#555\" />\n", x_.from, y_.to,
-                            y_.from, x_.to);
+        svg_ += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\" fill=\"none\" stroke=\"#555\" />\n", x_.from, ceiling_,
+                            floor_, x_.to);
         svg_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n", 0.5 * (x_.from + x_.to),
-                            y_.from + 34, escaped(chart_.x_label));
+                            floor_ + 34, escaped(chart_.x_label));
         svg_ += fmt::format("<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
                             0.5 * (y_.from + y_.to), escaped(chart_.y_label));
     }
@@ -320,7 +322,7 @@ class Drawing {
     const Chart& chart_;
     Axis x_, y_;
     bool empty_ = false;
-    double left_ = least_left, width_ = 0, height_ = 0;  // [px]
+    double left_ = least_left, width_ = 0, height_ = 0, ceiling_ = 0, floor_ = 0;  // [px]
     std::vector<LegendEntry> legend_;
     std::string svg_;
 };

@@ -47,6 +47,7 @@ struct Chart {
     std::vector<double> x_levels{}, y_levels{};  // thin lines across, within the range
     bool log_y = false;
     bool equal_scales = false;  // a length along x is as long along y
+    bool y_down = false;        // as pixels are counted
     int last_frame = always;
     std::string legend_markup{};  // below it
 };

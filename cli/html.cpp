@@ -171,6 +171,17 @@ std::string figures(const std::vector<std::string>& markups) {
     return all + "</div>\n";
 }
 
+std::string slider(const std::string& label_text, const std::vector<std::string>& sentences) {
+    std::string markup =
+        fmt::format("<div class=\"slider\" hidden=\"hidden\"><label>{1} <input id=\"frame\" type=\"range\" min=\"0\" "
+                    "max=\"{0}\" value=\"{0}\" autocomplete=\"off\" /></label></div>\n",
+                    sentences.size() - 1, escaped(label_text));
+    for (std::size_t i = 0; i < sentences.size(); ++i)
+        markup += fmt::format("<p data-frame=\"{}\"{}>{}</p>\n", i, i + 1 == sentences.size() ? " class=\"shown last\"" : "",
+                              escaped(sentences[i]));
+    return markup;
+}
+
 std::string page(const std::string& title_text, const std::string& body_markup) {
     return fmt::format("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n"
                        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "

@@ -34,6 +34,9 @@ std::string table(const std::string& caption_text, const std::vector<std::string
 /// Figures side by side as far as there is room.
 std::string figures(const std::vector<std::string>& markups);
 
+/// A slider through the frames of a page's figures, each with its sentence; one a page.
+std::string slider(const std::string& label_text, const std::vector<std::string>& sentences);
+
 /// The whole page: the style, the script that moves the slider, and a policy that forbids the browser any request.
 std::string page(const std::string& title_text, const std::string& body_markup);
 

@@ -24,7 +24,10 @@ std::string page_of(const std::filesystem::path& file) {
     if (kind == "record") return record_page(read_record(file), origin);
     if (kind == "fit") return fit_page(read_fit(file), origin);
     if (kind == "sensitivity") return sensitivity_page(read_sensitivity(file), origin);
-    root.refuse("kind", kind, "must be a record, a fit or a sensitivity study: other results have their preview");
+    if (kind == "specimen") return specimen_page(read_specimen(file), origin);
+    if (kind == "field") return field_page(file, origin);
+    if (kind == "track") return track_page(read_crack_track(file), origin);
+    root.refuse("kind", kind, "must be a record, a fit, a sensitivity study, a specimen, a displacement field or a crack track");
 }
 
 ExitStatus write_report(const ReportArguments& arguments, const CommonOptions& common) {
@@ -41,7 +44,7 @@ ExitStatus write_report(const ReportArguments& arguments, const CommonOptions& c
 Verb report_verb(CLI::App& command, const CommonOptions& common) {
     auto arguments = std::make_shared<ReportArguments>();
     CLI::App* verb = command.add_subcommand("report", "One page in HTML to look at a result, self-contained");
-    verb->add_option("file", arguments->file, "A record, a fit or a sensitivity study")->type_name("FILE.h5")->required();
+    verb->add_option("file", arguments->file, "What a verb of this command has saved")->type_name("FILE.h5")->required();
     verb->add_option("-o,--output", arguments->output, "Where the page goes")->type_name("REPORT.html")->required();
     return {verb, [arguments, &common] { return write_report(*arguments, common); }};
 }

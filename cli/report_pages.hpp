@@ -1,5 +1,6 @@
 #pragma once
 
+#include "datasets/crack_track.hpp"
 #include "datasets/io.hpp"
 
 #include <cstddef>
@@ -21,6 +22,9 @@ struct Origin {
 std::string record_page(const Record& record, const Origin& origin);
 std::string fit_page(const Fit& fit, const Origin& origin);
 std::string sensitivity_page(const Sensitivity& sensitivity, const Origin& origin);
+std::string specimen_page(const Specimen& specimen, const Origin& origin);
+std::string field_page(const std::filesystem::path& file, const Origin& origin);  // read image by image
+std::string track_page(const CrackTrack& track, const Origin& origin);
 
 /// The specimen with the crack's path, and where there are frames a slider through them, the deformed specimen among them. The
 /// frames shown are those of `shown_frames`.

@@ -14,11 +14,8 @@ namespace crampfit::cli {
 
 namespace {
 
-using Colour = cv::Vec3b;  // blue, green, red
-
 constexpr std::size_t most_frames = 40;
 constexpr int frame_pixels = 440;  // along the longer side
-constexpr int stress_steps = 16;   // of the colour scale: flat patches compress well
 
 /// A rectangle of the specimen's plane [m].
 struct View {
@@ -86,44 +83,6 @@ std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std
     return bytes;
 }
 
-// ---- colours
-
-Colour between(const Colour& a, const Colour& b, double part) {
-    Colour mixed;
-    for (int i = 0; i < 3; ++i) mixed[i] = static_cast<std::uint8_t>(std::lround(std::lerp(a[i], b[i], part)));
-    return mixed;
-}
-
-/// From pale earlywood to dark latewood.
-Colour wood_colour(double latewood) {
-    const Colour pale(0xB4, 0xDD, 0xF0), middle(0x62, 0x9A, 0xC4), dark(0x1D, 0x3F, 0x6B);
-    const double part = std::clamp(latewood, 0.0, 1.0);
-    return part < 0.5 ? between(pale, middle, 2 * part) : between(middle, dark, 2 * part - 1);
-}
-
-std::vector<Colour> stress_scale() {
-    cv::Mat steps(1, stress_steps, CV_8U), colours;
-    for (int i = 0; i < stress_steps; ++i) steps.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(255 * i / (stress_steps - 1));
-    cv::applyColorMap(steps, colours, cv::COLORMAP_CIVIDIS);
-    return {colours.begin<Colour>(), colours.end<Colour>()};
-}
-
-std::string hexadecimal(const Colour& colour) { return fmt::format("#{:02X}{:02X}{:02X}", colour[2], colour[1], colour[0]); }
-
-/// A row of colours under its ends' names.
-std::string colour_bar(const std::string& text, const std::string& low, const std::string& high,
-                       const std::vector<Colour>& colours) {
-    std::string svg;
-    const double width = 240.0 / static_cast<double>(colours.size());
-    for (std::size_t i = 0; i < colours.size(); ++i)
-        svg += fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"10\" fill=\"{}\" />",
-                           width * static_cast<double>(i), width + 0.3, hexadecimal(colours[i]));
-    return fmt::format(
-        "<figcaption>{0}<svg viewBox=\"0 0 440 26\" role=\"img\" aria-label=\"{0}: {1} to {2}\">{3}"
-        "<text x=\"0\" y=\"23\">{1}</text><text x=\"240\" y=\"23\" text-anchor=\"end\">{2}</text></svg></figcaption>\n",
-        escaped(text), escaped(low), escaped(high), svg);
-}
-
 // ---- the undeformed specimen
 
 ChartPicture picture_over(const View& view, const std::vector<std::uint8_t>& bytes, int frame = always) {
@@ -150,11 +109,7 @@ std::string map_figure(const Record& record, const std::vector<std::size_t>& fra
     for (std::size_t i = 0; i < frames.size(); ++i)
         chart.series.push_back(path_line(record.frames[frames[i]].crack, colour::vermillion, static_cast<int>(i)));
     chart.last_frame = static_cast<int>(frames.size()) - 1;
-    if (two_woods) {
-        std::vector<Colour> wood;
-        for (int i = 0; i < stress_steps; ++i) wood.push_back(wood_colour(static_cast<double>(i) / (stress_steps - 1)));
-        chart.legend_markup = colour_bar("Material", "first (earlywood)", "last (latewood)", wood);
-    }
+    if (two_woods) chart.legend_markup = wood_bar("first (earlywood)", "last (latewood)");
     return draw(chart);
 }
 
@@ -183,34 +138,10 @@ std::vector<double> principal_stress(const Frame& frame) {
     return values;
 }
 
-/// The range of stress that colours span: all but the 1 % at each end, which a crack tip stretches without bound.
-std::pair<double, double> stress_range(const std::vector<std::vector<double>>& stresses) {
-    std::vector<double> all;
-    for (const std::vector<double>& frame : stresses)
-        std::ranges::copy_if(frame, std::back_inserter(all), [](double value) { return std::isfinite(value); });
-    if (all.empty()) return {0, 0};
-    const auto quantile = [&](double part) {
-        const auto at = all.begin() + std::lround(part * static_cast<double>(all.size() - 1));
-        std::ranges::nth_element(all, at);
-        return *at;
-    };
-    return {quantile(0.01), quantile(0.99)};
-}
-
 std::vector<Vec2> deformed(const Record& record, const Frame& frame, double magnification) {
     std::vector<Vec2> places = record.point_position;
     for (std::size_t i = 0; i < places.size(); ++i) places[i] += magnification * frame.moved[i].cast<double>();
     return places;
-}
-
-std::vector<Colour> stress_colours(const std::vector<double>& stresses, double low, double high,
-                                   const std::vector<Colour>& scale) {
-    std::vector<Colour> colours;
-    for (const double stress : stresses) {
-        const double part = high > low && std::isfinite(stress) ? std::clamp((stress - low) / (high - low), 0.0, 1.0) : 0.0;
-        colours.push_back(scale[static_cast<std::size_t>(std::min(stress_steps - 1.0, part * stress_steps))]);
-    }
-    return colours;
 }
 
 /// The frames' pictures, so coarse that together they keep to `most_picture_bytes`.
@@ -239,10 +170,12 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
         for (const Vec2& place : places.back()) view.include(place, spacing_of);
     }
     view.keep_near(body);
-    const auto [low, high] = stress_range(stresses);
-    const std::vector<Colour> scale = stress_scale();
+    const auto [low, high] = most_of(stresses);
     std::vector<std::vector<Colour>> colours;
-    for (const std::vector<double>& frame : stresses) colours.push_back(stress_colours(frame, low, high, scale));
+    for (const std::vector<double>& frame : stresses) {
+        colours.emplace_back();
+        for (const double stress : frame) colours.back().push_back(scale_colour(stress, low, high));
+    }
     const std::vector<std::vector<std::uint8_t>> pictures = draw_frames(places, colours, spacing_of, view);
     Chart chart = plane_chart(magnification == 1 ? "Deformed specimen, displacements as they are"
                                                  : fmt::format("Deformed specimen, displacements {:g} times", magnification));
@@ -250,31 +183,26 @@ std::string deformed_figure(const Record& record, const std::vector<std::size_t>
         chart.pictures.push_back(picture_over(view, pictures[i], static_cast<int>(i)));
     chart.last_frame = static_cast<int>(frames.size()) - 1;
     const ScaledUnit unit = unit_for({low, high}, units::stress);
-    chart.legend_markup =
-        colour_bar(fmt::format("Largest principal stress [{}], tension positive", unit.symbol),
-                   fmt::format("{:.3g} or less", low / unit.factor), fmt::format("{:.3g} or more", high / unit.factor), scale);
+    chart.legend_markup = scale_bar(fmt::format("Largest principal stress [{}], tension positive", unit.symbol),
+                                    low / unit.factor, high / unit.factor);
     return draw(chart);
 }
 
-std::string slider(const Record& record, const std::vector<std::size_t>& frames) {
-    const std::size_t last = frames.size() - 1;
+std::vector<std::string> sentences_of(const Record& record, const std::vector<std::size_t>& frames) {
     const ScaledUnit clock = unit_for({record.frames.back().time}, units::time);
-    std::string markup =
-        fmt::format("<div class=\"slider\" hidden=\"hidden\"><label>Frame <input id=\"frame\" type=\"range\" min=\"0\" "
-                    "max=\"{0}\" value=\"{0}\" autocomplete=\"off\" /></label></div>\n",
-                    last);
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-        const Frame& frame = record.frames[frames[i]];
-        std::string text = fmt::format("Frame {} of {}: {:.4g} {}, displacement {:.4g} mm", frames[i] + 1, record.frames.size(),
-                                       frame.time / clock.factor, clock.symbol, 1e3 * frame.displacement);
+    std::vector<std::string> sentences;
+    for (const std::size_t at : frames) {
+        const Frame& frame = record.frames[at];
+        std::string& text =
+            sentences.emplace_back(fmt::format("Frame {} of {}: {:.4g} {}, displacement {:.4g} mm", at + 1, record.frames.size(),
+                                               frame.time / clock.factor, clock.symbol, 1e3 * frame.displacement));
         if (!record.series.empty()) {
             const Instant& instant = instant_of(record, frame);
             const double force = std::round(1e3 * instant.force) / 1e3 + 0.0;  // no -0.000
             text += fmt::format(", force {:.3f} N, crack {:.3f} mm", force, 1e3 * instant.crack_length);
         }
-        markup += fmt::format("<p data-frame=\"{}\"{}>{}</p>\n", i, i == last ? " class=\"shown last\"" : "", escaped(text));
     }
-    return markup;
+    return sentences;
 }
 
 }  // namespace
@@ -305,7 +233,7 @@ std::string specimen_section(const Record& record) {
     if (frames.empty()) markup = paragraph("The record holds no frames; \"frames\" under [output] of the scene asks for them.");
     else {
         drawings.push_back(deformed_figure(record, frames, spacing_of));
-        markup = slider(record, frames);
+        markup = slider("Frame", sentences_of(record, frames));
     }
     return section("Specimen and crack", markup + figures(drawings));
 }
