@@ -9,6 +9,7 @@
 #include "inverse/kept_walks.hpp"
 #include "inverse/lack_of_fit.hpp"
 #include "inverse/pool.hpp"
+#include "inverse/run_end.hpp"
 #include "inverse/run_store.hpp"
 #include "inverse/search.hpp"
 #include "inverse/study_check.hpp"
@@ -200,11 +201,12 @@ void FitOptions::validate() const {
     }
 }
 
-Fit fit_study(const Study& study, const FitOptions& options) {
+Fit fit_study(const Study& as_given, const FitOptions& options) {
     options.validate();
     const auto begin = Clock::now();
     const bool own = !options.forward;
-    check_study(study);
+    check_study(as_given);
+    const Study study = with_runs_to_the_data(as_given);
     StudyModel(study, {}, 0.0, nullptr);  // bad data are refused before there is a file for runs
     const int threads = thread_count(options.threads);
     RunStore store(options.keeping, study, options.stop_requested);
@@ -350,15 +352,19 @@ double resolution_before_fit(const KeptWalks& walks) { return walks.at_equilibri
 
 StudyFunction fit_function(const Study& study, const std::atomic<bool>* stop) {
     check_one_model(study);
-    const auto kept = std::make_shared<const Study>(study);
+    const auto kept = std::make_shared<const Study>(with_runs_to_the_data(study));
     const KeptWalks walks(*kept);
     const auto model = std::make_shared<StudyModel>(*kept, walks.in_any_order(), resolution_before_fit(walks), stop);
     return [kept, model](const Eigen::VectorXd& values, int threads) { return model->at(values, threads); };
 }
 
-std::size_t residual_count(const Study& study) { return StudyModel(study, Forward(), 0.0, nullptr).residual_count(); }
+std::size_t residual_count(const Study& as_given) {
+    const Study study = with_runs_to_the_data(as_given);
+    return StudyModel(study, Forward(), 0.0, nullptr).residual_count();
+}
 
-std::optional<Eigen::MatrixXd> fit_slopes(const Study& study, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+std::optional<Eigen::MatrixXd> fit_slopes(const Study& as_given, const Eigen::VectorXd& values, const std::atomic<bool>* stop) {
+    const Study study = with_runs_to_the_data(as_given);
     const KeptWalks walks(study);
     if (!walks.has_exact_slopes()) {
         return std::nullopt;

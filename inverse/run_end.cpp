@@ -1,6 +1,7 @@
 #include "inverse/run_end.hpp"
 
 #include "datasets/error.hpp"
+#include "datasets/io.hpp"
 #include "datasets/machine.hpp"
 #include "forward/loading.hpp"
 #include "inverse/curve.hpp"
@@ -94,6 +95,24 @@ bool is_measured(const std::vector<double>& column) {
 
 std::string file_of(const Experiment& test) {
     return test.scene.file.empty() ? "scene of " + test.name : test.scene.file.string();
+}
+
+// Whether a parameter changes how fast the measured displacement is driven.
+bool speed_is_fitted(const Study& study, std::size_t experiment) {
+    const Scene& scene = study.experiments[experiment].scene;
+    const std::optional<Drive> drive = measured_drive(scene);
+    const auto changes_speed = [&](const std::string& key) {
+        try {
+            Scene other = scene;
+            set_number(other, key, 2.0 * get_number(scene, key));
+            const std::optional<Drive> of_other = measured_drive(other);
+            return drive && of_other && of_other->speed != drive->speed;
+        } catch (const InputError&) {
+            return false;  // a key of another scene, or a number that may not be twice as large: no speed
+        }
+    };
+    return std::ranges::any_of(study.parameters,
+                               [&](const Parameter& parameter) { return std::ranges::any_of(parameter.keys, changes_speed); });
 }
 
 // A crack that has come to where each run ends is that long from there on, in data and runs alike; of forces from there on no run
@@ -332,10 +351,11 @@ void cut_rows(const Experiment& test, const std::vector<double>& abscissa, bool 
             file_of(test), end.key, text_of(test.scene, end),
             fmt::format("ends each run before the data begin, which go from {:g} to {:g} {}", units * first, units * last, unit));
     }
-    covered.remark =
-        fmt::format("{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} on are left "
+    covered.remark +=
+        fmt::format("{}{}: {} = {} ends the runs before the data, which go to {:.4g} {}: rows from {:.4g} {} on are left "
                     "out; a later stop would take them in.",
-                    test.name, end.key, text_of(test.scene, end), units * last, unit, units * beyond, unit);
+                    covered.remark.empty() ? "" : " ", test.name, end.key, text_of(test.scene, end), units * last, unit,
+                    units * beyond, unit);
     for (std::size_t i = 0; i < abscissa.size(); ++i) {
         if (abscissa[i] >= beyond) {
             for (std::vector<double> Curves::*column :
@@ -418,6 +438,10 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     const bool by_time = !is_measured(test.data.displacement);
     const std::vector<double>& abscissa = by_time ? test.data.time : test.data.displacement;
     CoveredData covered{test.data, test.fields, ""};
+    if (speed_is_fitted(study, experiment)) {
+        covered.remark =
+            fmt::format("{}: its speed is fitted: runs go on to the last row, whatever the scene's stop.", test.name);
+    }
     double grown = unbounded;
     if (is_measured(abscissa)) {
         cut_rows(test, abscissa, by_time, machine, covered);
@@ -431,6 +455,33 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
         cut_pictures(test, machine, as_pictures || grown == unbounded ? grown : first_from(other, abscissa, grown), covered);
     }
     return covered;
+}
+
+Study with_runs_to_the_data(Study study) {
+    for (std::size_t i = 0; i < study.experiments.size(); ++i) {
+        if (!speed_is_fitted(study, i)) {
+            continue;
+        }
+        Experiment& test = study.experiments[i];
+        const bool by_time = !is_measured(test.data.displacement);
+        double last = 0.0;
+        const auto take = [&](const std::vector<double>& instants) {
+            for (const double instant : instants) {
+                last = std::isnan(instant) ? last : std::max(last, instant);
+            }
+        };
+        take(by_time ? test.data.time : test.data.displacement);
+        if (test.fields && test.fields->by_displacement != by_time) {
+            take(test.fields->instants);
+        }
+        if (last == 0.0) {
+            continue;
+        }
+        std::optional<double>& stays = by_time ? test.scene.stop.time : test.scene.stop.displacement;
+        stays = stays.value_or(last - (by_time ? 0.0 : range_of(study, i, &Machine::displacement_offset).low));
+        (by_time ? test.scene.stop.displacement : test.scene.stop.time).reset();
+    }
+    return study;
 }
 
 }  // namespace crampfit

@@ -22,4 +22,9 @@ struct CoveredData {
 /// are. Throws InputError, naming the stop, where no row or no picture is left.
 CoveredData covered_data(const Study& study, std::size_t experiment);
 
+/// With scenes whose runs come to the last row of their data where the speed of the measured edge or body is fitted: at another
+/// speed the scene's own stop ends them elsewhere, and what follows would be their last force. A `stop.time` before the data end
+/// stays where rows are compared by time, `stop.displacement` where they are by displacement.
+Study with_runs_to_the_data(Study study);
+
 }  // namespace crampfit

@@ -4,6 +4,7 @@
 #include "inverse/curve.hpp"
 #include "inverse/fit.hpp"
 #include "inverse/run_end.hpp"
+#include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -178,6 +179,48 @@ TEST(SystemMachine, FixedRatio) {
     const Fit fit = fit_study(study, with(wedge));
     EXPECT_NEAR(fit.parameters[0].value, true_earlywood, 2 * fit.parameters[0].standard_error);
     EXPECT_LT(fit.reduced_chi_square, 1.5);
+}
+
+// Of a bar the force over time tells the speed times the modulus. At another speed the scene's stop would end a run before the
+// data or long after them, and its last force would stand for what is not known.
+TEST(SystemMachine, RunsComeToTheDataAtAnySpeed) {
+    Study study;
+    Experiment& bar = study.experiments.emplace_back();
+    bar.name = "bar";
+    bar.scene = bar_scene();  // goes 0.1 mm at 1 mm/min, in 6 s
+    bar.noise.force = 1.0;
+    std::mt19937 random(3);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    for (int i = 1; i <= 60; ++i) {
+        bar.data.time.push_back(0.2 * i);
+        bar.data.force.push_back(400e6 * 10e-3 * 10e-3 / 20e-3 * (0.5e-3 / 60) * 0.2 * i + noise(random));
+    }
+    bar.data.displacement.resize(bar.data.time.size(), std::nan(""));
+    bar.data.crack_length = bar.data.displacement;
+    Parameter speed;
+    speed.name = "speed";
+    speed.keys = {"edges.top.velocity.1"};
+    speed.lower = 0.2e-3 / 60;
+    speed.upper = 5e-3 / 60;
+    speed.unit_factor = 1e-3 / 60;
+    study.parameters = {speed};
+    FitOptions options;
+    options.threads = 1;
+    for (const double start : {0.3, 0.8, 3.0}) {
+        study.parameters = {speed};
+        study.parameters[0].initial = start * speed.unit_factor;
+        const Fit alone = fit_study(study, options);
+        EXPECT_EQ(alone.message.find("are left out"), std::string::npos) << alone.message;
+        EXPECT_NE(alone.message.find("its speed is fitted"), std::string::npos) << alone.message;
+        EXPECT_NEAR(alone.parameters[0].value, 0.5, 3 * alone.parameters[0].standard_error);
+        EXPECT_LT(alone.parameters[0].standard_error, 0.03);
+        study.parameters.push_back(bar_modulus());
+        const Fit both = fit_study(study, options);
+        EXPECT_NE(both.message.find("cannot be told apart"), std::string::npos) << both.message;
+        EXPECT_NEAR(both.parameters[0].value * both.parameters[1].value, 0.5 * 400, 5);
+        EXPECT_LT(both.parameters[1].lower_95, 110) << "E may be 100 MPa, at 2 mm/min";
+        EXPECT_GT(both.parameters[1].upper_95, 890) << "and 900 MPa, at 0.22 mm/min";
+    }
 }
 
 }  // namespace
