@@ -34,11 +34,7 @@ constexpr double least_apart = 0.25;  // of the sides of a dark line that is a c
 class TipFinder {
   public:
     TipFinder(const PictureSeries& pictures, const std::string& from, const CommonOptions& common)
-        : correlator_(make_correlator(pictures, common)), by_fields_(from != "gray") {
-        const FinePicture reference = read_reference(pictures);
-        geometry_ = {correlator_.lattice(), pictures.options.subset, reference.columns, reference.rows};
-        if (from != "fields") gray_.emplace(reference, read_mask(pictures.mask, reference));
-    }
+        : TipFinder(pictures, from, common, read_reference(pictures)) {}
 
     CrackTip operator()(const FinePicture& image) {
         if (!by_fields_) return counted(gray_->tip(image));
@@ -52,6 +48,14 @@ class TipFinder {
     const FieldGeometry& geometry() const { return geometry_; }
 
   private:
+    TipFinder(const PictureSeries& pictures, const std::string& from, const CommonOptions& common, const FinePicture& reference)
+        : correlator_(make_correlator(pictures, common)),
+          silhouette_(reference), geometry_{correlator_.lattice(), pictures.options.subset, reference.columns, reference.rows,
+                                            silhouette_},
+          by_fields_(from != "gray") {
+        if (from != "fields") gray_.emplace(reference, read_mask(pictures.mask, reference));
+    }
+
     CrackTip counted(const CrackTip& by_gray) {
         from_gray_ += by_gray.status == TipStatus::ok;
         return by_gray;
@@ -79,6 +83,7 @@ class TipFinder {
     }
 
     Correlator correlator_;
+    Silhouette silhouette_;
     FieldGeometry geometry_;
     std::optional<GrayTracker> gray_;
     bool by_fields_;

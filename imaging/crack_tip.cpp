@@ -156,13 +156,16 @@ double scan_score(const std::vector<Sample>& samples, const Line& line, double a
     return std::isfinite(left) ? left / (2 * (points - count)) : std::numeric_limits<double>::infinity();
 }
 
-/// Places whose subsets were torn, as a crack does it: many beside each other. Others are lost here and there.
-std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementField& field) {
+/// Places whose subsets were torn, as a crack does it: many beside each other. Others are lost here and there, and at the
+/// specimen's edges.
+std::vector<Vec2> torn_places(const FieldGeometry& geometry, const DisplacementField& field) {
+    const PointLattice& lattice = geometry.lattice;
+    const std::vector<bool> at_edge = geometry.silhouette.subsets_at_edge(lattice, geometry.subset);
     std::vector<bool> open(static_cast<std::size_t>(lattice.count()));
     for (std::size_t point = 0; point < open.size(); ++point) {
         const PointStatus status = field.status[point];
-        open[point] =
-            status == PointStatus::moved_apart || status == PointStatus::low_correlation || status == PointStatus::no_convergence;
+        open[point] = !at_edge[point] && (status == PointStatus::moved_apart || status == PointStatus::low_correlation ||
+                                          status == PointStatus::no_convergence);
     }
     std::vector<Vec2> torn;
     for (int start = 0; start < lattice.count(); ++start) {
@@ -184,8 +187,9 @@ std::vector<Vec2> torn_places(const PointLattice& lattice, const DisplacementFie
     return torn;
 }
 
-/// The motion apart of what lies to either side of a place of the line, which has its origin there; none where nothing does.
-double jump_at(const std::vector<Sample>& samples, const Line& line, int subset) {
+/// The motion apart of what lies to either side of a place of the line, which has its origin there; `alone` where one side has
+/// nothing.
+double jump_at(const std::vector<Sample>& samples, const Line& line, int subset, double alone = 0) {
     std::array<Vec2, 2> sum{Vec2::Zero(), Vec2::Zero()};
     std::array<int, 2> count{0, 0};
     const double width = clearance(subset, line.angle);
@@ -196,7 +200,7 @@ double jump_at(const std::vector<Sample>& samples, const Line& line, int subset)
         sum[side] += sample.displacement;
         ++count[side];
     }
-    return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : 0;
+    return count[0] > 0 && count[1] > 0 ? (sum[1] / count[1] - sum[0] / count[0]).norm() : alone;
 }
 
 /// The line as it is some way behind its tip [px].
@@ -243,8 +247,10 @@ std::optional<Line> along_torn(const std::vector<Vec2>& torn, const std::vector<
         last = std::max(last, along.dot(place - middle));
     }
     const double angle = std::atan2(along.y(), along.x());
-    if (jump_at(samples, {middle + last * along, angle}, geometry.subset) >
-        jump_at(samples, {middle + first * along, angle}, geometry.subset)) {
+    // An end with nothing beside it, as in a notch, is the mouth.
+    constexpr double everything = std::numeric_limits<double>::infinity();
+    if (jump_at(samples, {middle + last * along, angle}, geometry.subset, everything) >
+        jump_at(samples, {middle + first * along, angle}, geometry.subset, everything)) {
         along = -along;
         last = -first;
     }
@@ -462,18 +468,6 @@ double spread_along(const std::vector<Sample>& samples, const Line& line, int su
     return std::sqrt(squares / weights);
 }
 
-/// Length of the crack's line from the picture's border to the tip [px].
-double length_in_picture(const Line& line, int columns, int rows) {
-    const Vec2 back = -line.direction();
-    double length = std::numeric_limits<double>::infinity();
-    const auto to_side = [&](double from, double along, double high) {
-        if (along != 0) length = std::min(length, ((along > 0 ? high : -0.5) - from) / along);
-    };
-    to_side(line.tip.x(), back.x(), columns - 0.5);
-    to_side(line.tip.y(), back.y(), rows - 0.5);
-    return length;
-}
-
 std::vector<Sample> followed(const PointLattice& lattice, const DisplacementField& field) {
     std::vector<Sample> samples;
     for (int point = 0; point < lattice.count(); ++point)
@@ -522,7 +516,7 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
         return found;
     }
     // In wood whose rings differ much in stiffness the series may fit better elsewhere than at the crack.
-    const std::vector<Vec2> torn = torn_places(lattice, field);
+    const std::vector<Vec2> torn = torn_places(geometry, field);
     const double width = clearance(geometry.subset, line.angle);
     const bool opens =
         jump_at(samples, behind(line, torn_behind * width), geometry.subset) > tearing_jump(field, geometry.subset);
@@ -551,7 +545,8 @@ CrackTip find_crack_tip(const FieldGeometry& geometry, const DisplacementField& 
     found.tip = line.tip;
     found.angle = std::remainder(line.angle, 2 * std::numbers::pi);
     const auto length = [&](const Vec2& moved, double turned) {
-        return length_in_picture({line.tip + moved, line.angle + turned}, geometry.columns, geometry.rows);
+        const Line other{line.tip + moved, line.angle + turned};
+        return geometry.silhouette.to_mouth(other.tip, -other.direction());
     };
     found.length = length(Vec2::Zero(), 0);
     if (missed) {

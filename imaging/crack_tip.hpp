@@ -2,6 +2,7 @@
 
 #include "datasets/crack_track.hpp"
 #include "datasets/displacement_field.hpp"
+#include "imaging/silhouette.hpp"
 
 #include <optional>
 
@@ -13,6 +14,7 @@ struct FieldGeometry {
     int subset = 0;   // edge [px]
     int columns = 0;  // of the picture [px]
     int rows = 0;
+    const Silhouette& silhouette;
 };
 
 /// Finds the tip of a straight crack that has entered the picture from one of its sides. Around the tip of a crack the

@@ -22,7 +22,6 @@ constexpr double longest_gap = 30;           // in a line that is broken [px]
 constexpr double least_cosine = 0.8;         // of the turn that it may make there
 constexpr int heading = 25;                  // of a line's last stretch, that says how it goes on [px]
 constexpr double at_border = 2 * tolerance;  // from here to the border a line is taken to go on [px]
-constexpr double along_edge = 0.01;          // what a step along an edge counts, of one into the wood
 
 cv::Mat disk(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 
@@ -87,10 +86,9 @@ Contrast compare(const cv::Mat& before, const cv::Mat& now, const cv::Mat& count
 }
 
 /// Shortest ways from one pixel of a patch to all others; steps near the patch's rim are dear, so that ways keep to its middle.
-/// Those on an edge that has moved hardly count: no crack is as long as the flanks of the notch that it opens.
 class Ways {
   public:
-    Ways(const cv::Mat& mask, const cv::Mat& to_rim, const cv::Mat& on_edge, cv::Point from)
+    Ways(const cv::Mat& mask, const cv::Mat& to_rim, cv::Point from)
         : cost_(mask.size(), CV_64F, cv::Scalar(std::numeric_limits<double>::infinity())),
           came_(mask.size(), CV_8S, cv::Scalar(-1)) {
         using Item = std::pair<double, std::pair<int, int>>;
@@ -105,8 +103,7 @@ class Ways {
             for (int i = 0; i < 8; ++i) {
                 const cv::Point next = here + steps[i];
                 if (!cv::Rect({0, 0}, mask.size()).contains(next) || !mask.at<std::uint8_t>(next)) continue;
-                const double counted = on_edge.at<std::uint8_t>(next) ? along_edge : 1;
-                const double then = cost + counted * (i < 4 ? 1 : std::sqrt(2.0)) * (1 + 2 / to_rim.at<float>(next));
+                const double then = cost + (i < 4 ? 1 : std::sqrt(2.0)) * (1 + 2 / to_rim.at<float>(next));
                 if (then < cost_.at<double>(next)) {
                     cost_.at<double>(next) = then;
                     came_.at<schar>(next) = static_cast<schar>(i);
@@ -219,21 +216,12 @@ DarkWay middle_of(const cv::Mat& set, const Ground& ground) {
     cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::distanceTransform(padded, to_rim, cv::DIST_L2, 3);
     to_rim = to_rim(cv::Rect(1, 1, box.width, box.height));
-    // The middle of what an edge has laid bare by its motion is as far from where it was as from the patch's other rim.
-    const cv::Mat on_edge = ground.room(box) <= to_rim + at_border;
     const cv::Point mouth = mouth_at_border(to_rim, box.tl(), ground);
     cv::Point deepest;
     cv::minMaxLoc(to_rim, nullptr, nullptr, nullptr, &deepest, mask);
-    const Ways ways(mask, to_rim, on_edge, mouth.x >= 0 ? mouth : Ways(mask, to_rim, on_edge, deepest).farthest());
+    const Ways ways(mask, to_rim, mouth.x >= 0 ? mouth : Ways(mask, to_rim, deepest).farthest());
     DarkWay way;
-    std::vector<cv::Point> points = ways.way_to(ways.farthest());
-    if (mouth.x >= 0) {
-        // What has run along the edge until it turned into the wood.
-        const auto turn = std::ranges::find_if(points, [&](const cv::Point& p) { return on_edge.at<std::uint8_t>(p) == 0; });
-        if (static_cast<double>(turn - points.begin()) > 2 * (at_border + to_rim.at<float>(mouth)))
-            points.erase(points.begin(), turn - 1);
-    }
-    for (const cv::Point& p : points) {
+    for (const cv::Point& p : ways.way_to(ways.farthest())) {
         way.points.emplace_back(p.x + box.x, p.y + box.y);
         way.half_width.push_back(to_rim.at<float>(p));
     }
@@ -292,8 +280,9 @@ cv::Mat join_patches(const Patches& patches, const Ground& ground) {
 /// The middle of the strongest line that has darkened, where it is long and slender.
 std::optional<DarkWay> line_in(const Contrast& contrast, const Ground& ground) {
     if (contrast.dark.strongest == 0) return std::nullopt;
-    const DarkWay way = middle_of(join_patches(contrast.dark, ground), ground);
-    const double length = static_cast<double>(way.points.size()), width = 2 * mean_of(way.half_width, 0, way.half_width.size());
+    const cv::Mat joined = join_patches(contrast.dark, ground);
+    const DarkWay way = middle_of(joined, ground);
+    const double length = static_cast<double>(way.points.size()), width = cv::countNonZero(joined) / length;
     if (length < std::max(least_length, least_slender * width)) return std::nullopt;
     return way;
 }

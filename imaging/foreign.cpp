@@ -206,6 +206,12 @@ cv::Mat local_variance(const cv::Mat& gray) {
     return local_mean(gray.mul(gray)) - mean.mul(mean);
 }
 
+/// 255 where no grain is seen beyond a camera's noise.
+cv::Mat even_ground(const cv::Mat& gray, double noise) {
+    constexpr double most_scatter = 1.8;  // of what its most even tenth has: of 25 pixels nearly all have less
+    return local_variance(gray) < std::pow(std::max(blank_grain, most_scatter * noise), 2);
+}
+
 /// The ground that at least three of a picture's corners show: two may lie in the same ring.
 std::optional<Ground> ground_in_corners(const cv::Mat& gray) {
     constexpr int side = 9, least_corners = 3;
@@ -239,10 +245,9 @@ double noise_of_black(const cv::Mat& gray, double black) {
 }
 
 cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black, double noise) {
-    constexpr double most_scatter = 1.8;  // of what its most even tenth has: of 25 pixels nearly all have less
-    constexpr double apart = 0.03;        // beyond the limit of black or white: another gray for sure
-    constexpr double rim = 0.1;           // EW may be as white as the ground, LW is not
-    const cv::Mat even = local_variance(gray) < std::pow(std::max(blank_grain, most_scatter * noise), 2);
+    constexpr double apart = 0.03;  // beyond the limit of black or white: another gray for sure
+    constexpr double rim = 0.1;     // EW may be as white as the ground, LW is not
+    const cv::Mat even = even_ground(gray, noise);
     cv::Mat blank = cv::Mat::zeros(gray.size(), CV_8U);
     for (const bool dark : {true, false}) {
         cv::Mat colour;
@@ -257,6 +262,29 @@ cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black, double
     if (scatter[0] < 2 * blank_grain) return cv::Mat::zeros(gray.size(), CV_8U);  // around nothing
     if (cv::countNonZero(blank) > 0) cv::dilate(blank, blank, disk(4));           // its blurred rim
     return blank;
+}
+
+cv::Mat find_notches(const cv::Mat& gray, double black, double noise) {
+    constexpr double wide = 8, slenderest = 8;  // half the width where it is widest [px]; length over width
+    cv::Mat dark = even_ground(gray, noise) & (local_mean(gray) < black), padded, to_rim;
+    cv::morphologyEx(dark, dark, cv::MORPH_OPEN, disk(2));
+    cv::copyMakeBorder(dark, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
+    cv::distanceTransform(padded, to_rim, cv::DIST_L2, 5);
+    to_rim = to_rim(cv::Rect({1, 1}, dark.size()));
+    std::vector<std::uint8_t> chosen{0};
+    const cv::Mat patches = for_patches(dark, [&](int, const int* box) { chosen.push_back(touches_edge(box, gray.size())); });
+    std::vector<float> half(chosen.size(), 0);
+    std::vector<int> area(chosen.size(), 0);
+    for (int v = 0; v < gray.rows; ++v)
+        for (int u = 0; u < gray.cols; ++u) {
+            half[patches.at<int>(v, u)] = std::max(half[patches.at<int>(v, u)], to_rim.at<float>(v, u));
+            ++area[patches.at<int>(v, u)];
+        }
+    for (std::size_t i = 1; i < chosen.size(); ++i)
+        chosen[i] = chosen[i] && half[i] > wide && area[i] < slenderest * std::pow(2 * half[i], 2);
+    cv::Mat notches = chosen_patches(patches, chosen);
+    if (cv::countNonZero(notches) > 0) cv::dilate(notches, notches, disk(4));  // its blurred rim
+    return notches;
 }
 
 cv::Mat find_ground(const cv::Mat& gray) {

@@ -1,9 +1,9 @@
 #include "imaging/gray_track.hpp"
 
 #include "imaging/closed_way.hpp"
-#include "imaging/foreign.hpp"
 #include "imaging/line_up.hpp"
 #include "imaging/opening.hpp"
+#include "imaging/silhouette.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -23,8 +23,6 @@ constexpr double most_left = 0.7;       // of the reference's contrast, in pictu
 constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
 constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
 constexpr double slack = 3;             // of the line's middle [px]
-constexpr double most_noise = 0.03;     // of its pixels, of the picture's brightest: a camera's in poor light
-constexpr double ground = 0.3;          // of the picture's brightest, up to which an even ground about the specimen is dark
 constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
 
 cv::Mat pixels_of(const FinePicture& picture) {
@@ -53,14 +51,6 @@ double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
     if (d.x != 0) length = std::min(length, ((d.x > 0 ? size.width - 0.5 : -0.5) - from.x) / d.x);
     if (d.y != 0) length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
     return std::max(length, 0.0);
-}
-
-/// How far it is from a place of the specimen to its edge, or to the picture's border [px].
-double to_edge(const cv::Point2d& from, const cv::Point2d& d, const cv::Mat& specimen) {
-    const double border = to_border(from, d, specimen.size());
-    for (double length = 0; length < border - 0.5; ++length)
-        if (specimen.at<std::uint8_t>(cv::Point(from + length * d)) == 0) return length;
-    return border;
 }
 
 /// The picture along a line and `reach` pixels to either side [points of the line x 2 reach + 1].
@@ -148,22 +138,17 @@ std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
 }  // namespace
 
 struct GrayTracker::State {
-    cv::Mat reference;
-    cv::Mat specimen;  // 0 on an even dark ground around it
-    cv::Mat allowed;   // 0 there and where masked
+    Silhouette silhouette;
+    cv::Mat reference = {};
+    cv::Mat allowed = {};  // 0 on a dark ground around the specimen and where masked
     double contrast = 0;
 };
 
 GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::uint8_t>& mask) {
-    auto state = std::make_unique<State>();
+    auto state = std::make_unique<State>(State{Silhouette(reference)});
     state->reference = pixels_of(reference);
-    double brightest = 0;
-    cv::minMaxLoc(state->reference, nullptr, &brightest);
-    const cv::Mat gray = state->reference / std::max(brightest, 1.0);
-    const double noise = std::min(noise_of_black(gray, ground), most_noise);
-    // Bright wood without any pattern is as even as a bright ground.
-    state->specimen = (find_blank(gray, {}, ground, noise) == 0) | (state->reference > 0.5 * cv::mean(state->reference)[0]);
-    state->allowed = state->specimen.clone();
+    state->allowed =
+        cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(state->silhouette.mask().data())).clone();
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
     cv::Scalar mean, deviation;
@@ -204,7 +189,8 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     found.status = TipStatus::ok;
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);
-    found.length = to_edge(way->points.front(), direction_at(way->points, false, heading), state_->specimen) + tip->along;
+    const cv::Point2d front = way->points.front(), outward = direction_at(way->points, false, heading);
+    found.length = state_->silhouette.to_edge({front.x, front.y}, {outward.x, outward.y}) + tip->along;
     std::vector<cv::Point2d> points = closed_way(reference, image, weight, whole, *way);
     points.resize(points.size() > behind ? points.size() - behind : 0);
     points.insert(points.end(), tip->last.begin(), tip->last.end());

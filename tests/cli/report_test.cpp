@@ -1,4 +1,7 @@
+#include "datasets/crack_track.hpp"
+#include "datasets/displacement_field.hpp"
 #include "datasets/io.hpp"
+#include "datasets/specimen.hpp"
 #include "inverse/lack_of_fit.hpp"
 #include "tests/cli/command.hpp"
 #include "tests/cli/scenes.hpp"
@@ -156,9 +159,9 @@ TEST(SystemReport, PageOfAFitShowsDataIntervalsProfilesPosteriorAndRuns) {
     EXPECT_TRUE(contains(page, "<title>E &amp; G of a &lt;block&gt;</title>"));
     EXPECT_TRUE(contains(page, "<p>Converged.</p>\n<p class=\"warning\">Lack of fit: the residuals of force of"));
     EXPECT_TRUE(contains(page, "<p>pull: weight 1.</p>"));
-    for (const char* part :
-         {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack", "Profile of E",
-          "Posterior of E", "E and toughness", "-0.50", "did not converge", "crampfit fit study.toml --set &#39;model.cell=0.2 mm&#39; -o fit.h5"})
+    for (const char* part : {"38 to 42", "90 to 111", "toughness &lt;EW&gt;", "pull: force", "pull: arrival of the crack",
+                             "Profile of E", "Posterior of E", "E and toughness", "-0.50", "did not converge",
+                             "crampfit fit study.toml --set &#39;model.cell=0.2 mm&#39; -o fit.h5"})
         EXPECT_TRUE(contains(page, part)) << part;
     // A point for each: two curves with a legend each, their residuals, the profile, the samples, the runs that ended, their
     // legend.
@@ -214,7 +217,92 @@ TEST(SystemReport, PageOfASensitivityStudy) {
     study.runs = {{{40}, {1}, "finished", 1}, {{41}, {2}, "finished", 1}, {{42}, {nothing}, "failed <hard>", 1}};
     write(study, command.path("study.h5"));
     const std::string page = report(command, "study.h5");
-    for (const char* part : {"0.4 to 0.6", "<td>N / (MPa)</td>", "<td>local</td>", "2 of 3 runs ended well", "failed &lt;hard&gt;", "elasticity"})
+    for (const char* part :
+         {"0.4 to 0.6", "<td>N / (MPa)</td>", "<td>local</td>", "2 of 3 runs ended well", "failed &lt;hard&gt;", "elasticity"})
+        EXPECT_TRUE(contains(page, part)) << part;
+}
+
+TEST(SystemReport, PageOfASpecimen) {
+    Command command;
+    Specimen specimen;
+    specimen.rows = specimen.columns = 1;
+    specimen.label = {Specimen::void_label};
+    write(specimen, command.path("nothing.h5"));
+    EXPECT_TRUE(contains(report(command, "nothing.h5"), "<title>nothing.h5</title>"));
+    specimen.columns = 60;
+    specimen.rows = 40;
+    specimen.pixel = 25e-6;
+    specimen.classes = {"EW", "LW <dark>"};
+    for (int i = 0; i < 60 * 40; ++i) specimen.label.push_back(i % 60 >= 40);
+    specimen.label.resize(60 * 40);
+    specimen.label[0] = Specimen::void_label;
+    specimen.density.assign(60 * 40, 400);
+    specimen.orientation.assign(60 * 40, 0.1f);
+    specimen.borders = {{3, {{10, 0}, {11, 39}}}, {4, {{50, 0}, {51, 39}}}};
+    specimen.rings = {{4, 40, 0.3125}};
+    specimen.source = "/a/folder/block.png";
+    write(specimen, command.path("specimen.h5"));
+    const std::string page = report(command, "specimen.h5");
+    for (const char* part : {"<title>block.png</title>", "60 x 40 pixels, 25 um", "LW &lt;dark&gt;", "33.3 % of the picture",
+                             "No wood", "2 borders, 1 rings between two of them", "x [px]", "ring borders", "radial direction",
+                             "Density [kg/m³]", "<td class=\"number\">0.312</td>", "Width [mm]", ">1<"})
+        EXPECT_TRUE(contains(page, part)) << part;
+    EXPECT_EQ(count(page, "<image "), 2);
+}
+
+TEST(SystemReport, PageOfDisplacementFields) {
+    Command command;
+    FieldSeries series;
+    series.reference = "shots/reference & more.png";
+    series.lattice = {30, 20, 15, 15, 10};
+    series.subset = 31;
+    series.pixel = 1e-5;
+    for (int i = 0; i < 60; ++i) series.images.push_back(fmt::format("shots/image_{}.png", i));
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise(0, 1);
+    write_fields(
+        series,
+        [&](int image) {
+            DisplacementField field;
+            for (auto column : {&DisplacementField::u, &DisplacementField::v, &DisplacementField::exx, &DisplacementField::eyy,
+                                &DisplacementField::exy, &DisplacementField::zncc, &DisplacementField::sigma})
+                for (int i = 0; i < 600; ++i) (field.*column).push_back(i < image ? nothing : noise(random));
+            field.status.resize(600, PointStatus::ok);
+            std::fill_n(field.status.begin(), image, PointStatus::moved_apart);
+            return std::optional(field);
+        },
+        command.path("field.h5"));
+    const std::string page = report(command, "field.h5");
+    for (const char* part : {"Displacements against reference &amp; more.png", "<dd>60</dd>", "30 x 20, 10 pixels apart",
+                             "Image 60 of 60: image_59.png, 90.2 % of the points followed", "moved apart (59)", "u [px]"})
+        EXPECT_TRUE(contains(page, part)) << part;
+    EXPECT_EQ(count(page, "<p data-frame="), 24);
+    EXPECT_EQ(count(page, "<image "), 5 * 24);
+    EXPECT_EQ(count(page, "class=\"shown last\""), 1 + 5);
+}
+
+TEST(SystemReport, PageOfACrackTrack) {
+    Command command;
+    CrackTrack track;
+    track.reference = "reference.png";
+    track.images = {"a.png", "b.png", "c.png"};
+    track.columns = 300;
+    track.rows = 200;
+    track.tips = {{},
+                  {TipStatus::ok, {100, 90}, 0.1, 100.5, 2, {{0, 80}, {50, 85}, {100, 90}}},
+                  {TipStatus::ok, {150, 95}, 0.1, 150.5, 1.5}};
+    write(track, command.path("pixels.h5"));
+    std::string page = report(command, "pixels.h5");
+    for (const char* part :
+         {"Crack in reference.png", "found in 2 of 3 images", "size not known", "Crack length [px]", "no crack", "150.5"})
+        EXPECT_TRUE(contains(page, part)) << part;
+    track.pixel = 1e-5;
+    track.time = {0, 1, 2};
+    track.force = {0, 5, nothing};
+    track.displacement = {0, 1e-4, nothing};
+    write(track, command.path("track.h5"));
+    page = report(command, "track.h5");
+    for (const char* part : {"Crack length [mm]", "Displacement [mm]", "Force [N]", "Time [s]", "1.505"})
         EXPECT_TRUE(contains(page, part)) << part;
 }
 
@@ -242,10 +330,6 @@ TEST(SlowReport, PageOfManyFineFramesStaysSmall) {
 TEST(SystemReport, RefusesWhatItCannotReportAndNeverHarmsItsInput) {
     Command command;
     write(small_fit(), command.path("fit.h5"));
-    Specimen specimen;
-    specimen.rows = specimen.columns = 1;
-    specimen.label = {Specimen::void_label};
-    write(specimen, command.path("specimen.h5"));
     command.folder.write("scene.toml", small_scene);
     const std::string before = command.folder.read("fit.h5");
     const auto refused = [&](const std::string& file, const std::string& output, const std::string& why) {
@@ -255,7 +339,6 @@ TEST(SystemReport, RefusesWhatItCannotReportAndNeverHarmsItsInput) {
     };
     refused("absent.h5", "page.html", "does not exist");
     refused("scene.toml", "page.html", "HDF5");
-    refused("specimen.h5", "page.html", "must be a record, a fit or a sensitivity study");
     refused("fit.h5", "fit.h5", "must not be a file that is read");
     refused("fit.h5", "no/such/folder/page.html", "folder");
     EXPECT_EQ(command.run({"report", command.path("fit.h5"), "-o", command.path("page.html"), "--set", "a=1"}).status, 2);

@@ -20,17 +20,20 @@ namespace {
 class VirtualTest {
   public:
     explicit VirtualTest(const VirtualCameraOptions& options)
-        : options_(options), camera_(options), correlator_(fine(camera_.photograph(0)), {}, {}, "reference") {}
+        : options_(options), camera_(options), correlator_(fine(camera_.photograph(0)), {}, {}, "reference"),
+          silhouette_(fine(camera_.photograph(0))) {}
 
     CrackTip tip(const PlaneDisplacement& displacement) {
         const DisplacementField field = correlator_.field(fine(camera_.photograph(displacement, ++shot_)));
-        return find_crack_tip({correlator_.lattice(), CorrelateOptions().subset, options_.columns, options_.rows}, field);
+        return find_crack_tip({correlator_.lattice(), CorrelateOptions().subset, options_.columns, options_.rows, silhouette_},
+                              field);
     }
 
   private:
     VirtualCameraOptions options_;
     VirtualCamera camera_;
     Correlator correlator_;
+    Silhouette silhouette_;
     std::uint64_t shot_ = 0;
 };
 
@@ -230,8 +233,10 @@ TEST(VerificationCrackTip, NoneAtAShadow) {
     options.columns = 480;
     options.rows = 400;
     const VirtualCamera camera(options);
-    const Correlator correlator(fine(camera.photograph(0)), {}, {}, "reference");
-    const FieldGeometry geometry{correlator.lattice(), CorrelateOptions().subset, options.columns, options.rows};
+    const FinePicture reference = fine(camera.photograph(0));
+    const Correlator correlator(reference, {}, {}, "reference");
+    const Silhouette silhouette(reference);
+    const FieldGeometry geometry{correlator.lattice(), CorrelateOptions().subset, options.columns, options.rows, silhouette};
     FinePicture shadowed = fine(camera.photograph(1));
     for (std::size_t y = 190; y < 196; ++y)
         for (std::size_t x = 0; x < 200; ++x) shadowed.gray[y * 480 + x] *= 0.3f;
