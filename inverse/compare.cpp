@@ -1,5 +1,7 @@
 #include "inverse/compare.hpp"
 
+#include "inverse/uncertainty.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -48,13 +50,30 @@ ComparedModel compared(const std::string& model, const Fit& fit) {
     return row;
 }
 
-// All models have the same data and parameters.
-void weigh(std::vector<ComparedModel>& models, const std::vector<double>& spreads, double unexplained, std::size_t points) {
+// How many neighbouring residuals count as one.
+double neighbours_as_one(const Fit& fit) {
+    Eigen::VectorXd off(static_cast<Eigen::Index>(fit.residuals.size()));
+    std::vector<int> lengths;
+    for (std::size_t i = 0; i < fit.residuals.size(); ++i) {
+        const FitResidual& one = fit.residuals[i];
+        off[static_cast<Eigen::Index>(i)] = (one.modelled - one.measured) / one.sigma;
+        const bool goes_on = i > 0 && one.experiment == fit.residuals[i - 1].experiment && one.kind == fit.residuals[i - 1].kind;
+        if (!goes_on) {
+            lengths.push_back(0);
+        }
+        ++lengths.back();
+    }
+    return correlation_time(off, lengths);
+}
+
+// All models have the same data and parameters. `together`: so many neighbouring residuals count as one.
+void weigh(std::vector<ComparedModel>& models, const std::vector<double>& spreads, double unexplained, double together,
+           std::size_t points) {
     const auto k = static_cast<double>(models.front().values.size());
     double least = std::numeric_limits<double>::infinity(), sum = 0;
     for (std::size_t i = 0; i < models.size(); ++i) {
         ComparedModel& model = models[i];
-        const double deviance = model.misfit / unexplained + spreads[i];
+        const double deviance = (model.misfit / unexplained + spreads[i]) / together;
         model.aic = deviance + 2 * k;
         model.bic = deviance + k * std::log(static_cast<double>(std::max<std::size_t>(1, points)));
         least = std::min(least, model.aic);
@@ -71,9 +90,14 @@ void weigh(std::vector<ComparedModel>& models, const std::vector<double>& spread
 
 std::string weight_text(double weight) { return weight > 0.99 ? "more than 0.99" : fmt::format("{:.2g}", weight); }
 
-// What the data say of the best two; `on_wide_cells`: of each model -2 ln of its likelihood there, as far as that is known.
+// -2 ln of a model's likelihood, on cells twice as wide and on the study's.
+struct OnTwoGrids {
+    double wide, here;
+};
+
+// What the data say of the best two; `grids`: of each model, as far as that is known.
 std::string verdict(const std::string& key, const std::vector<ComparedModel>& models,
-                    const std::map<std::string, double>& on_wide_cells) {
+                    const std::map<std::string, OnTwoGrids>& grids, double together) {
     constexpr double plain = 2;  // of AIC: less, and both have support (Burnham and Anderson 2002, section 2.6)
     const ComparedModel &first = models[0], &second = models[1];
     if (second.aic - first.aic <= plain) {
@@ -82,23 +106,34 @@ std::string verdict(const std::string& key, const std::vector<ComparedModel>& mo
     }
     std::string text = fmt::format("{} \"{}\" explains the data best, with {} of the evidence; next \"{}\" with {}. ", key,
                                    first.name, weight_text(first.weight), second.name, weight_text(second.weight));
-    // What a grid half as fine changes may be left on this one (left_by_grid).
-    std::vector<std::string> close;
-    const auto wide = [&](const ComparedModel& model) {
-        const auto found = on_wide_cells.find(model.name);
-        return found == on_wide_cells.end() ? std::nan("") : found->second;
-    };
+    // What a grid half as fine changes from model to model may be left on this one (left_by_grid), and what it changes in the
+    // best one itself may be so in another that is as near to it.
+    const auto best = grids.find(first.name);
+    if (best == grids.end()) {
+        return text;
+    }
+    const double own = std::abs(best->second.wide - best->second.here) / together;
+    std::vector<std::string> otherwise, near;
     for (const ComparedModel& other : models) {
-        const double here = other.aic - first.aic, there = wide(other) - wide(first);
+        const auto found = grids.find(other.name);
+        const double here = other.aic - first.aic;
+        const double there = found == grids.end() ? std::nan("") : (found->second.wide - best->second.wide) / together;
         if (std::abs(there - here) > here) {
-            close.push_back(fmt::format("\"{}\" ({:+.2g} there, {:+.2g} here)", other.name, there, here));
+            otherwise.push_back(fmt::format("\"{}\" ({:+.2g} there, {:+.2g} here)", other.name, there, here));
+        } else if (here > 0 && here < own) {
+            near.push_back(fmt::format("\"{}\" ({:.2g})", other.name, here));
         }
     }
-    if (!close.empty()) {
-        text += fmt::format(
-            "The grid may decide that: by cells twice as wide AIC tells it otherwise from {}. Finer cells would tell. ",
-            fmt::join(close, ", "));
+    if (!otherwise.empty()) {
+        text += fmt::format("The grid may decide that: by cells twice as wide AIC tells it otherwise from {}. ",
+                            fmt::join(otherwise, ", "));
     }
+    if (!near.empty()) {
+        text +=
+            fmt::format("The grid may decide that: halving the cells has changed AIC by {:.2g}, more than it is ahead of {}. ",
+                        own, fmt::join(near, ", "));
+    }
+    text += otherwise.empty() && near.empty() ? "" : "Finer cells would tell. ";
     return text;
 }
 
@@ -120,13 +155,13 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     }
     Fit best;
     std::vector<ComparedModel> models;
-    std::map<std::string, double> on_wide_cells;
+    std::map<std::string, OnTwoGrids> grids;
     std::vector<double> spreads;  // beyond that of the sharpest model
     double unexplained = std::numeric_limits<double>::infinity(), seconds = 0;
     bool interrupted = false;
     for (std::size_t i = 0; i < study.models.size() && !interrupted; ++i) {
         FitOptions own = options_of(study, i, options);
-        own.tell_wide_deviance = [&, i](double deviance) { on_wide_cells[study.models[i].name] = deviance; };
+        own.tell_wide_deviance = [&, i](double wide, double here) { grids[study.models[i].name] = {wide, here}; };
         Fit fit = fit_study(model_of(study, i), own);
         models.push_back(compared(study.models[i].name, fit));
         spreads.push_back(fit.residuals.empty() ? std::numeric_limits<double>::infinity() : spread(fit));
@@ -141,7 +176,8 @@ Fit fit_models(const Study& study, const FitOptions& options) {
     for (double& beyond : spreads) {
         beyond = std::isfinite(beyond) ? beyond - sharpest : 0.0;
     }
-    weigh(models, spreads, std::max(1.0, unexplained), best.residuals.size());
+    const double together = best.residuals.empty() ? 1.0 : neighbours_as_one(best);
+    weigh(models, spreads, std::max(1.0, unexplained), together, best.residuals.size());
     if (models.size() > 1) {
         std::string failed;
         for (const ComparedModel& model : models) {
@@ -152,7 +188,7 @@ Fit fit_models(const Study& study, const FitOptions& options) {
         if (!failed.empty()) {
             failed = "Of " + failed + " no run ended well, so that nothing is said of it. ";
         }
-        const std::string said = std::isfinite(models[1].aic) ? verdict(study.compared_key, models, on_wide_cells)
+        const std::string said = std::isfinite(models[1].aic) ? verdict(study.compared_key, models, grids, together)
                                                               : fmt::format("{} \"{}\" has nothing to be compared with. ",
                                                                             study.compared_key, models[0].name);
         best.message = said + failed + best.message;

@@ -335,8 +335,9 @@ Fit fit_study(const Study& as_given, const FitOptions& options) {
                             100 * model.resolution());
         }
     }
-    if (options.tell_wide_deviance && by_walks && !objective.stopped() && before.descend(stage)) {
-        options.tell_wide_deviance(before.deviance());
+    if (options.tell_wide_deviance && by_walks && objective.best() && !objective.stopped() && before.descend(stage)) {
+        options.tell_wide_deviance(before.deviance(),
+                                   model.likely_knowledge(*objective.best()->evaluation, solver_resolution).deviance);
     }
     fill_runs(fit, box, objective.runs());
     fit.seconds = seconds_since(begin);

@@ -33,7 +33,8 @@ struct FitOptions {
     const std::atomic<bool>* stop_requested = nullptr;  // set from outside: the fit ends with what it has
     unsigned seed = 1;                                  // of everything that is drawn at random
     RunKeeping keeping;                                 // of the forward runs, as they end
-    std::function<void(double)> tell_wide_deviance;     // of models that are compared: WideSearch::deviance
+    // Of models that are compared: WideSearch::deviance, and the same of the fit itself.
+    std::function<void(double wide, double here)> tell_wide_deviance;
     Farm* farm = nullptr;  // runs of the same study elsewhere, of no other `forward` than crampfit::simulate
 
     /// Throws InputError naming the option that is out of range.

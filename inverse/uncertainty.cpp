@@ -41,17 +41,6 @@ Eigen::VectorXd weights_of(const MeasuredCurves& curves) {
 // How much a measurement has to say, on average by what it says: 1 where all weights are.
 double mean_weight(const Eigen::VectorXd& weights) { return weights.size() > 0 ? weights.squaredNorm() / weights.sum() : 1.0; }
 
-// Mean over the curves, by their lengths.
-double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>& curve_lengths) {
-    double sum = 0;
-    Eigen::Index begin = 0;
-    for (const int length : curve_lengths) {
-        sum += length * correlation_time(residuals.segment(begin, length));
-        begin += length;
-    }
-    return begin > 0 ? sum / static_cast<double>(begin) : 1.0;
-}
-
 /// Names what cannot be told, and remembers whose intervals are the whole box for it.
 class Undetermined {
   public:
@@ -196,6 +185,16 @@ Eigen::MatrixXd slope_beside_jumps(const Directions& directions) {
 }
 
 }  // namespace
+
+double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>& curve_lengths) {
+    double sum = 0;
+    Eigen::Index begin = 0;
+    for (const int length : curve_lengths) {
+        sum += length * correlation_time(residuals.segment(begin, length));
+        begin += length;
+    }
+    return begin > 0 ? sum / static_cast<double>(begin) : 1.0;
+}
 
 double student_975(int degrees_of_freedom) {
     // Abramowitz and Stegun (1964), 26.7.3 and 26.7.4: P(|T| < t) as a finite sum in cos(theta), theta = atan(t /

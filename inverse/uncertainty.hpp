@@ -65,6 +65,10 @@ struct Uncertainty {
 Uncertainty estimate_uncertainty(Objective& objective, const MeasuredCurves& curves, const std::vector<std::string>& names,
                                  double step, const Window& window);
 
+/// How many neighbouring residuals count as one: 1 + 2 sum rho_k, rho_k their autocorrelation at distance k, up to the first that
+/// chance explains; the mean over curves of so many.
+double correlation_time(const Eigen::VectorXd& residuals, const std::vector<int>& curve_lengths);
+
 /// The 97.5 % point of Student's t distribution.
 double student_975(int degrees_of_freedom);
 

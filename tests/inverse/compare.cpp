@@ -1,6 +1,7 @@
 // Models against each other; robust losses; distances between curves.
 #include "inverse/compare.hpp"
 #include "inverse/curve_distance.hpp"
+#include "inverse/uncertainty.hpp"
 #include "tests/inverse/fake_wedge.hpp"
 
 #include <gtest/gtest.h>
@@ -70,7 +71,17 @@ TEST(UnitCompare, FiguresFollowTheirFormulas) {
     EXPECT_EQ(fit.models[0].name, "hoop stress");
     EXPECT_EQ(fit.models[0].misfit, fit.misfit);
     EXPECT_EQ(fit.models[0].values[0], fit.parameters[0].value);
-    const double c = std::max(1.0, fit.reduced_chi_square);
+    Eigen::VectorXd off(static_cast<Eigen::Index>(fit.residuals.size()));
+    std::vector<int> lengths;  // of each kind's
+    for (std::size_t i = 0; i < fit.residuals.size(); ++i) {
+        const FitResidual& one = fit.residuals[i];
+        off[static_cast<Eigen::Index>(i)] = (one.modelled - one.measured) / one.sigma;
+        if (i == 0 || one.kind != fit.residuals[i - 1].kind) {
+            lengths.push_back(0);
+        }
+        ++lengths.back();
+    }
+    const double c = std::max(1.0, fit.reduced_chi_square) * correlation_time(off, lengths);
     double sum = 0;
     for (const ComparedModel& model : fit.models) {
         EXPECT_NEAR(model.aic, model.misfit / c + 4, 1e-9 * model.aic);

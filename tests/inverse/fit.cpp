@@ -588,16 +588,20 @@ TEST(SystemFit, WhereAFitStartsDoesNotTellHowWellTheModelKnows) {
 TEST(SystemFit, WideCellsTellHowLikelyTheDataAreWhereModelsAreCompared) {
     const BarTest bar;
     const Study study = bar.study();
-    double told = 0.0, squares = 0.0;
+    double told = 0.0, told_here = 0.0, squares = 0.0;
     FitOptions options;
     options.threads = 1;
-    options.tell_wide_deviance = [&](double deviance) { told = deviance; };
+    options.tell_wide_deviance = [&](double wide, double here) {
+        told = wide;
+        told_here = here;
+    };
     fit_study(study, options);
     const Curves& data = study.experiments[0].data;
     for (std::size_t i = 0; i < data.force.size(); ++i) {
         squares += std::pow((data.force[i] - bar.least_squares * 5e3 * data.displacement[i]) / 2.0, 2);
     }
     EXPECT_NEAR(told, squares + 39 * 2 * std::log(2.0), 0.01);  // of 40 rows one is the fit's
+    EXPECT_NEAR(told_here, told, 0.01);
 }
 
 // The crack parts the specimen between two of the last rows: that tells toughness / E to 3 %, and beyond, to either side, the
