@@ -11,8 +11,8 @@ namespace crampfit {
 namespace {
 
 constexpr double initial_step = 0.15;  // of the box
-constexpr double x_tolerance = 1e-4;   // of the box
-constexpr double f_tolerance = 1e-6;   // of the misfit
+constexpr double x_tolerance = 1e-5;   // of the box
+constexpr double f_tolerance = 1e-9;   // of the misfit
 
 const std::map<std::string, nlopt_algorithm>& algorithms() {
     static const std::map<std::string, nlopt_algorithm> table = {
