@@ -439,8 +439,8 @@ CoveredData covered_data(const Study& study, std::size_t experiment) {
     const std::vector<double>& abscissa = by_time ? test.data.time : test.data.displacement;
     CoveredData covered{test.data, test.fields, ""};
     if (speed_is_fitted(study, experiment)) {
-        covered.remark =
-            fmt::format("{}: its speed is fitted: runs go on to the last row, whatever the scene's stop.", test.name);
+        covered.remark = fmt::format("{}: its speed is fitted: a {} of the scene ends no run.", test.name,
+                                     by_time ? "stop.displacement" : "stop.time");
     }
     double grown = unbounded;
     if (is_measured(abscissa)) {
