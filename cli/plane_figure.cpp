@@ -2,6 +2,7 @@
 
 #include "cli/html.hpp"
 
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
@@ -76,6 +77,12 @@ ChartPicture picture_between(const Vec2& low, const Vec2& high, const std::vecto
             .bottom = 1e3 * low.y(),
             .top = 1e3 * high.y(),
             .frame = frame};
+}
+
+std::vector<std::uint8_t> png_of(const cv::Mat& picture) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+    return bytes;
 }
 
 Colour wood_colour(double latewood) {

@@ -25,6 +25,9 @@ ChartSeries path_line(const std::vector<Vec2>& path, const char* ink, int frame 
 /// A PNG between two corners of the plane, lower left and upper right [m].
 ChartPicture picture_between(const Vec2& low, const Vec2& high, const std::vector<std::uint8_t>& png, int frame = always);
 
+/// As small as it gets.
+std::vector<std::uint8_t> png_of(const cv::Mat& picture);
+
 using Colour = cv::Vec3b;  // blue, green, red
 
 /// From pale earlywood, 0, to dark latewood, 1.

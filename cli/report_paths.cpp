@@ -2,7 +2,6 @@
 #include "cli/plane_figure.hpp"
 #include "cli/report_pages.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
@@ -86,9 +85,7 @@ std::vector<std::uint8_t> cut_out(Sight& sight, int longer_side) {
         cv::resize(shown, shown, {}, factor, factor, cv::INTER_AREA);
     cv::Mat pale;  // lines stand out from it
     shown.convertTo(pale, CV_8U, 0.65, 0.35 * 255);
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".png", pale, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-    return bytes;
+    return png_of(pale);
 }
 
 std::string figure(const Sight& sight, const std::vector<std::uint8_t>& png) {

@@ -5,13 +5,13 @@
 #include "datasets/displacement_field.hpp"
 #include "datasets/specimen.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace crampfit::cli {
@@ -41,12 +41,6 @@ double median(std::vector<double> values) {
 }
 
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
-
-std::vector<std::uint8_t> png_of(const cv::Mat& picture) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-    return bytes;
-}
 
 /// Over the pixels' outer edges, of which the first one's centre is the origin.
 ChartPicture over_pixels(double left, double top, double right, double bottom, const std::vector<std::uint8_t>& png,

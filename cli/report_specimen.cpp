@@ -2,7 +2,6 @@
 #include "cli/plane_figure.hpp"
 #include "cli/report_pages.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
@@ -78,9 +77,7 @@ std::vector<std::uint8_t> draw_points(const std::vector<Vec2>& points, const std
         const cv::Point opposite(static_cast<int>(std::ceil(high.x())), picture.rows - static_cast<int>(std::floor(low.y())));
         picture(cv::Rect(corner, opposite) & whole).setTo(cv::Scalar(colours[i]));
     }
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".png", picture, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-    return bytes;
+    return png_of(picture);
 }
 
 // ---- the undeformed specimen

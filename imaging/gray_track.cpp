@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace crampfit {
@@ -43,14 +42,6 @@ std::vector<cv::Point2d> even(const std::vector<cv::Point2d>& line) {
         left -= cv::norm(line[i] - from);
     }
     return points;
-}
-
-/// How far it is from a place to the picture's border in a direction [px].
-double to_border(const cv::Point2d& from, const cv::Point2d& d, cv::Size size) {
-    double length = std::numeric_limits<double>::infinity();
-    if (d.x != 0) length = std::min(length, ((d.x > 0 ? size.width - 0.5 : -0.5) - from.x) / d.x);
-    if (d.y != 0) length = std::min(length, ((d.y > 0 ? size.height - 0.5 : -0.5) - from.y) / d.y);
-    return std::max(length, 0.0);
 }
 
 /// The picture along a line and `reach` pixels to either side [points of the line x 2 reach + 1].
@@ -98,7 +89,8 @@ std::optional<Tip> tip_along(const cv::Mat& reference, const cv::Mat& seen, cons
     const std::size_t from = known.size() > behind ? known.size() - behind : 0;
     std::vector<cv::Point2d> line(known.begin() + static_cast<std::ptrdiff_t>(from), known.end());
     const cv::Point2d d = direction_at(known, true, heading);
-    const int room = std::min(ahead, static_cast<int>(to_border(known.back(), d, reference.size())));
+    const int room = std::min(
+        ahead, static_cast<int>(to_border({known.back().x, known.back().y}, {d.x, d.y}, reference.cols, reference.rows)));
     for (int i = 1; i <= room; ++i) line.push_back(known.back() + i * d);
     const std::size_t tail = way.half_width.size() > behind ? way.half_width.size() - behind : 0;
     const double widest = *std::max_element(way.half_width.begin() + static_cast<std::ptrdiff_t>(tail), way.half_width.end());

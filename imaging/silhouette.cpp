@@ -19,14 +19,14 @@ constexpr double ground = 0.3;       // of the picture's brightest, up to which 
 constexpr int corner = 12;           // how far it may reach into a notch's root, too narrow to be seen as even [px]
 constexpr int edge_blur = 3;         // of a specimen's edge by the lens [px]
 
+}  // namespace
+
 double to_border(const Eigen::Vector2d& from, const Eigen::Vector2d& d, int columns, int rows) {
     double length = std::numeric_limits<double>::infinity();
     if (d.x() != 0) length = std::min(length, ((d.x() > 0 ? columns - 0.5 : -0.5) - from.x()) / d.x());
     if (d.y() != 0) length = std::min(length, ((d.y() > 0 ? rows - 0.5 : -0.5) - from.y()) / d.y());
     return std::max(length, 0.0);
 }
-
-}  // namespace
 
 Silhouette::Silhouette(const FinePicture& picture) : columns_(picture.columns), rows_(picture.rows) {
     const cv::Mat pixels(rows_, columns_, CV_32F, const_cast<float*>(picture.gray.data()));

@@ -10,6 +10,9 @@
 
 namespace crampfit {
 
+/// How far it is from a place to the picture's border in a direction of length one [px].
+double to_border(const Eigen::Vector2d& from, const Eigen::Vector2d& direction, int columns, int rows);
+
 /// The specimen as a picture shows it before an even dark ground, which reaches in from the picture's corners, and its notches,
 /// which do from its sides. All of the picture where there is none.
 class Silhouette {
