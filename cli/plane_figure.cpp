@@ -85,6 +85,14 @@ std::vector<std::uint8_t> png_of(const cv::Mat& picture) {
     return bytes;
 }
 
+cv::Mat shrunk(const cv::Mat& picture, double factor) {
+    if (factor >= 1) return picture;
+    const auto side = [&](int pixels) { return std::max(1, static_cast<int>(std::lround(factor * pixels))); };
+    cv::Mat smaller;
+    cv::resize(picture, smaller, {side(picture.cols), side(picture.rows)}, 0, 0, cv::INTER_AREA);
+    return smaller;
+}
+
 Colour wood_colour(double latewood) {
     const Colour pale(0xB4, 0xDD, 0xF0), middle(0x62, 0x9A, 0xC4), dark(0x1D, 0x3F, 0x6B);
     const double part = std::clamp(latewood, 0.0, 1.0);

@@ -28,6 +28,9 @@ ChartPicture picture_between(const Vec2& low, const Vec2& high, const std::vecto
 /// As small as it gets.
 std::vector<std::uint8_t> png_of(const cv::Mat& picture);
 
+/// A picture whose sides are by that factor shorter, where it is below 1, and a pixel at least.
+cv::Mat shrunk(const cv::Mat& picture, double factor);
+
 using Colour = cv::Vec3b;  // blue, green, red
 
 /// From pale earlywood, 0, to dark latewood, 1.

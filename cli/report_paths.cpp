@@ -80,9 +80,7 @@ std::vector<std::uint8_t> cut_out(Sight& sight, int longer_side) {
         cv::Rect(cv::Point(left, picture.rows - top), cv::Point(right, picture.rows - bottom)) & cv::Rect({0, 0}, whole.size());
     sight.low = picture.low + pixel.cwiseProduct(Vec2(part.x, picture.rows - part.y - part.height));
     sight.high = picture.low + pixel.cwiseProduct(Vec2(part.x + part.width, picture.rows - part.y));
-    cv::Mat shown = whole(part);
-    if (const double factor = longer_side / static_cast<double>(std::max(part.width, part.height)); factor < 1)
-        cv::resize(shown, shown, {}, factor, factor, cv::INTER_AREA);
+    const cv::Mat shown = shrunk(whole(part), longer_side / static_cast<double>(std::max(part.width, part.height)));
     cv::Mat pale;  // lines stand out from it
     shown.convertTo(pale, CV_8U, 0.65, 0.35 * 255);
     return png_of(pale);

@@ -54,14 +54,17 @@ std::string pixel_text(const std::optional<double>& pixel) {
 
 // ---- a specimen
 
+/// By how much less a picture of so many bytes must be along its sides.
+double to_fit(std::size_t bytes, std::size_t allowed) {
+    return std::min(0.9, std::sqrt(static_cast<double>(allowed) / static_cast<double>(bytes)));
+}
+
 /// A map as coarse as it takes to keep to `most_picture_bytes`.
 std::vector<std::uint8_t> small_png(const cv::Mat& map) {
-    for (double pixels = map_pixels;; pixels *= 0.7) {
-        cv::Mat shown = map;
-        if (const double factor = pixels / std::max(map.cols, map.rows); factor < 1)
-            cv::resize(map, shown, {}, factor, factor, cv::INTER_AREA);
-        std::vector<std::uint8_t> bytes = png_of(shown);
+    for (double pixels = map_pixels;;) {
+        std::vector<std::uint8_t> bytes = png_of(shrunk(map, pixels / std::max(map.cols, map.rows)));
         if (bytes.size() <= most_picture_bytes || pixels < 2) return bytes;
+        pixels *= to_fit(bytes.size(), most_picture_bytes);
     }
 }
 
@@ -265,19 +268,18 @@ std::string field_figure(const SeenFields& seen, std::size_t map) {
     Chart chart = pixel_chart(field_maps[map].title);
     const double half = 0.5 * lattice.step;
     const std::size_t allowed = most_picture_bytes / std::size(field_maps);
-    for (double factor = 1;; factor *= 0.7) {
+    for (double factor = 1;;) {
         std::size_t bytes = 0;
         chart.pictures.clear();
         for (std::size_t i = 0; i < seen.shown.size(); ++i) {
-            cv::Mat picture = lattice_picture(lattice, seen.maps[map][i], low, high);
-            if (factor < 1) cv::resize(picture, picture, {}, factor, factor, cv::INTER_AREA);
-            const std::vector<std::uint8_t> png = png_of(picture);
+            const std::vector<std::uint8_t> png = png_of(shrunk(lattice_picture(lattice, seen.maps[map][i], low, high), factor));
             bytes += png.size();
             chart.pictures.push_back(over_pixels(lattice.first_x - half, lattice.first_y - half,
                                                  lattice.x(lattice.count() - 1) + half, lattice.y(lattice.count() - 1) + half,
                                                  png, static_cast<int>(i)));
         }
-        if (bytes <= allowed || factor * 400 < 8) break;
+        if (bytes <= allowed || factor * std::max(lattice.columns, lattice.rows) < 2) break;
+        factor *= to_fit(bytes, allowed);
     }
     chart.last_frame = static_cast<int>(seen.shown.size()) - 1;
     chart.legend_markup = scale_bar(field_maps[map].text, low, high);

@@ -280,10 +280,14 @@ cv::Mat find_notches(const cv::Mat& gray, double black, double noise) {
             half[patches.at<int>(v, u)] = std::max(half[patches.at<int>(v, u)], to_rim.at<float>(v, u));
             ++area[patches.at<int>(v, u)];
         }
-    for (std::size_t i = 1; i < chosen.size(); ++i)
+    int of_notches = 0, elsewhere = 0;
+    for (std::size_t i = 1; i < chosen.size(); ++i) {
         chosen[i] = chosen[i] && half[i] > wide && area[i] < slenderest * std::pow(2 * half[i], 2);
+        (chosen[i] ? of_notches : elsewhere) += area[i];
+    }
+    if (of_notches == 0 || elsewhere > most_within * of_notches) return cv::Mat::zeros(gray.size(), CV_8U);
     cv::Mat notches = chosen_patches(patches, chosen);
-    if (cv::countNonZero(notches) > 0) cv::dilate(notches, notches, disk(4));  // its blurred rim
+    cv::dilate(notches, notches, disk(4));  // its blurred rim
     return notches;
 }
 

@@ -23,8 +23,9 @@ struct WoodView {
 /// deviation of a camera's pixels there.
 cv::Mat find_blank(const cv::Mat& gray, const cv::Mat& bgr, double black = 0.08, double noise = 0.0);
 
-/// 255 where an even black reaches in from one of the picture's sides, no corner, and is wide somewhere: a notch in a specimen
-/// that fills the picture. A crack is slender.
+/// 255 where an even black reaches in from one of the picture's sides and is wide, at least 17 pixels and an eighth of its
+/// length: a notch in a specimen that fills the picture. A crack is slender. None where the picture has more of such black
+/// elsewhere, as drawn rings do.
 cv::Mat find_notches(const cv::Mat& gray, double black, double noise);
 
 /// Standard deviation of the pixels where it is black (as above): that of the most even tenth, which an even ground has of noise
