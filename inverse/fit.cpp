@@ -312,10 +312,11 @@ Fit fit_study(const Study& as_given, const FitOptions& options) {
             fit.message += "What is said of intervals rests on runs moved from the best one by its derivatives. ";
         }
         fill_exploration(fit, box, uncertainty, exploration);
-        if (close) {
-            const Evaluation there = wide.get();
+        if (own) {
+            const Run& about = wide.valid() ? looked_at : uncertainty.best;
+            const Evaluation there = wide.valid() ? wide.get() : before.at(about.x);
             if (there.usable() && uncertainty.slope.size() > 0) {
-                take_in_grid(fit, box, best.x, left_by_grid(study, model, looked_at, there, uncertainty));
+                take_in_grid(fit, box, best.x, left_by_grid(study, model, about, there, uncertainty));
             } else {
                 take_in_untold_grid(fit, box, best.x,
                                     there.usable() ? "no slopes at the best point" : "cells twice as wide: " + there.status);

@@ -23,6 +23,9 @@ constexpr double resolved = 1e-3;
 // cell, nor slopes at the best point for the way there. From there to twice as far what is told of the others loses its weight.
 constexpr double farthest_told = 0.1;
 
+// Of the variance that the data leave: not worth a word.
+constexpr double nothing = 1e-4;
+
 // Of a toughness: what is left where two grids happen to agree.
 constexpr double least_of_toughness = 0.01;
 
@@ -172,6 +175,7 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen:
     const Eigen::VectorXd values = box.values(x);
     const Eigen::VectorXd shifts = box.values(x + left) - values;
     double farthest = 0.0;  // of what can be told
+    bool is_something = false;
     std::vector<std::string> told;
     for (Eigen::Index j = 0; j < box.size(); ++j) {
         const Parameter& parameter = box.parameters()[static_cast<std::size_t>(j)];
@@ -183,6 +187,7 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen:
             continue;
         }
         farthest = std::max(farthest, std::abs(shifts[j]) / (farthest_told * size_of(parameter, values[j])));
+        is_something = is_something || std::pow(left[j] * slope_in_unit(box, j, x), 2) > nothing * fit.covariance(j, j);
         told.push_back(shift_text(parameter, values[j], shifts[j]));
     }
     if (told.empty()) {
@@ -194,6 +199,10 @@ void take_in_grid(Fit& fit, const UnitBox& box, const Eigen::VectorXd& x, Eigen:
     if (farthest > 1.0) {
         fit.message += untold_grid(
             fmt::format("a fit on cells twice as wide, which would tell it, lies too far off: {}", fmt::join(told, ", ")));
+        return;
+    }
+    if (!is_something) {
+        fit.message += "A run on cells twice as wide says that the grid leaves less than a hundredth of a standard error. ";
         return;
     }
     const double most = (1.0 - of_data.array() / fit.covariance.diagonal().array()).maxCoeff();

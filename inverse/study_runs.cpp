@@ -220,7 +220,7 @@ SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::functi
         return lack_of_fit(check_fit(model_.residuals(best), static_cast<int>(model_.box().size()))).empty();
     };
     SearchResult found = crampfit::search(objective_, study_.optimizer, initial, options_.seed, is_explained, stage);
-    if (options_.forward || !walks_.at_equilibrium()) {
+    if (options_.forward) {
         return found;
     }
     const auto go_on = [&] {
@@ -238,7 +238,9 @@ SearchResult StudyRuns::search(const Eigen::VectorXd& initial, const std::functi
         return converged;
     };
     found.converged = heed_data(weigh(found.converged), [&] { return weigh(go_on()); });
-    found.converged = know_better(found.converged, go_on, [&] { return weigh(go_on()); });
+    if (walks_.at_equilibrium()) {  // else each look costs as much as the search
+        found.converged = know_better(found.converged, go_on, [&] { return weigh(go_on()); });
+    }
     return found;
 }
 

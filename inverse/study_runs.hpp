@@ -37,8 +37,8 @@ class StudyRuns {
     /// that the crack goes is the best one.
     SearchResult find_start(const std::function<void(const std::string&)>& stage);
 
-    /// By the study's method, from `initial`. Where runs go from equilibrium to equilibrium it goes on from the best one, weighed
-    /// by what the residuals say of the model's resolution, as `descend` does; else the resolution is what it is at worst.
+    /// By the study's method, from `initial`, and from the best run on, weighed by what the residuals say of the model's
+    /// resolution, as `descend` does; without walks less thoroughly.
     SearchResult search(const Eigen::VectorXd& initial, const std::function<void(const std::string&)>& stage);
 
     /// `descend` from the best run on. Whether that ended by its own criterion.

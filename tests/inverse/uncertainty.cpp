@@ -370,6 +370,92 @@ TEST(VerificationUncertainty, IntervalsCoverTheTruthAsOftenAsTheySay) {
     }
 }
 
+// A block drawn up with a traction p on its side, by which no run has a derivative: F = A (E u / L + nu p), a straight line of
+// two unknown coefficients. A dozen tests, each with its own noise.
+TEST(VerificationUncertainty, WithoutDerivativesErrorsAreThoseOfTheNoise) {
+    constexpr double area = 1e-4, length = 10e-3, nu = 0.33, modulus = 40e6, traction = 0.5e6, noise = 0.3;
+    constexpr int tests = 12, rows = 30;
+    Study study;
+    study.experiments.resize(1);
+    study.experiments[0].scene = parse_scene(R"(
+[model]
+plane = "stress"
+thickness = "10 mm"
+cell = "2.5 mm"
+[specimen]
+size = ["10 mm", "10 mm"]
+material = "EW"
+[materials]
+EW = { kind = "isotropic", E = "50 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "100 J/m^2" }
+[[edges]]
+name = "bottom"
+side = "bottom"
+velocity = ["free", "0 m/s"]
+[[edges]]
+name = "left"
+side = "left"
+velocity = ["0 m/s", "free"]
+[[edges]]
+name = "right"
+side = "right"
+traction = ["0.2 MPa", "0 MPa"]
+[[edges]]
+name = "top"
+side = "top"
+velocity = ["free", "1 mm/min"]
+[measure]
+force = "top"
+displacement = "top"
+[stop]
+displacement = "0.1 mm"
+)",
+                                             "pressed.toml");
+    study.experiments[0].noise.force = noise;
+    Parameter pressure = bar_modulus();
+    pressure.name = "p";
+    pressure.keys = {"edges.right.traction.0"};
+    pressure.initial = 0.2e6;
+    pressure.lower = -1e6;
+    pressure.upper = 2e6;
+    Parameter young = bar_modulus();
+    young.initial = 50e6;
+    young.lower = 20e6;
+    young.upper = 80e6;
+    study.parameters = {pressure, young};
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    std::vector<double> exact;
+    for (int i = 0; i < rows; ++i) {
+        const double u = 0.1e-3 * (i + 0.5) / rows;
+        const Eigen::Vector2d slope(area * nu, area * u / length);
+        information += slope * slope.transpose() / (noise * noise);
+        study.experiments[0].data.displacement.push_back(u);
+        exact.push_back(slope.dot(Eigen::Vector2d(traction, modulus)));
+    }
+    const Eigen::Matrix2d covariance = information.inverse();
+    std::mt19937 random(7);
+    std::normal_distribution<double> error(0, noise);
+    Eigen::Vector2d stated = Eigen::Vector2d::Zero(), scatter = Eigen::Vector2d::Zero();  // mean squares, over the exact variance
+    for (int test = 0; test < tests; ++test) {
+        study.experiments[0].data.force = exact;
+        for (double& force : study.experiments[0].data.force) {
+            force += error(random);
+        }
+        const Fit fit = fit_study(study, {});
+        ASSERT_EQ(fit.status, FitStatus::converged) << fit.message;
+        for (Eigen::Index j = 0; j < 2; ++j) {
+            const FittedParameter& fitted = fit.parameters[static_cast<std::size_t>(j)];
+            stated[j] += std::pow(1e6 * fitted.standard_error, 2) / covariance(j, j) / tests;
+            scatter[j] += std::pow(1e6 * fitted.value - (j == 0 ? traction : modulus), 2) / covariance(j, j) / tests;
+        }
+    }
+    std::printf("standard errors of p, E over the exact ones: stated %.2f, %.2f; seen %.2f, %.2f\n", std::sqrt(stated[0]),
+                std::sqrt(stated[1]), std::sqrt(scatter[0]), std::sqrt(scatter[1]));
+    for (Eigen::Index j = 0; j < 2; ++j) {
+        EXPECT_NEAR(std::sqrt(stated[j]), 1.1, 0.15);  // where residuals go together by chance they are somewhat wider
+        EXPECT_LT(scatter[j], 2.53);                   // once in a hundred such dozens: chi-square of twelve
+    }
+}
+
 TEST(VerificationUncertainty, IntervalsWidenWithTheNoiseOfTheModel) {
     const FakeWedge wedge;
     const Study study = wedge_study(wedge, 0.02, 1e-4, 3);
