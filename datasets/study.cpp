@@ -95,6 +95,28 @@ void check_crack_lengths(const Experiment& experiment) {
     }
 }
 
+// Where two instruments share a table, as a camera that knows the time alone, rows without a displacement get that on the line
+// over time between the rows that have both; none beyond these.
+Curves placed_by_time(Curves curves) {
+    std::vector<std::pair<double, double>> known;  // time, displacement
+    for (std::size_t i = 0; i < std::min(curves.time.size(), curves.displacement.size()); ++i) {
+        if (!std::isnan(curves.time[i]) && !std::isnan(curves.displacement[i])) {
+            known.emplace_back(curves.time[i], curves.displacement[i]);
+        }
+    }
+    std::ranges::stable_sort(known, {}, &std::pair<double, double>::first);
+    for (std::size_t i = 0; i < curves.displacement.size() && !known.empty(); ++i) {
+        const double time = std::isnan(curves.displacement[i]) && !curves.time.empty() ? curves.time[i] : std::nan("");
+        if (time >= known.front().first && time <= known.back().first) {
+            const auto after = std::ranges::lower_bound(known, time, {}, &std::pair<double, double>::first);
+            const auto before = after == known.begin() ? after : std::prev(after);
+            const double share = after->first > time ? (time - before->first) / (after->first - before->first) : 1.0;
+            curves.displacement[i] = std::lerp(before->second, after->second, share);
+        }
+    }
+    return curves;
+}
+
 Experiment read_experiment(const Entry& entry, std::size_t number, const Overrides& scene_overrides) {
     entry.only({"name", "scene", "data", "fields", "photograph", "noise", "weight", "compliance", "force_offset",
                 "displacement_offset"});
@@ -108,7 +130,7 @@ Experiment read_experiment(const Entry& entry, std::size_t number, const Overrid
     }
     if (entry.has("data") || !experiment.fields) {
         experiment.data_file = entry.at("data").existing_file();
-        experiment.data = read_curves(experiment.data_file);
+        experiment.data = placed_by_time(read_curves(experiment.data_file));
     }
     if (const auto photograph = entry.find("photograph")) {
         experiment.photograph = read_photograph(*photograph, experiment.scene);

@@ -24,6 +24,8 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool ro
         walk_ = std::make_unique<Quasistatic>(scene_, plan_, materials_, *body_, numbers_, threads_);
         body_.reset();
     }
+    const auto is_stopped = [&] { return options.stop_requested && options.stop_requested->load(std::memory_order_relaxed); };
+    walk_->end_where(is_stopped);
     const int known = walk_->equilibria();
     std::vector<double> by;
     for (const std::string& key : numbers_) {
@@ -33,10 +35,10 @@ Record KeptWalk::run(const Scene& scene, const SimulateOptions& options, bool ro
     }
     walk_->set_rough(rough);
     walk_->shift(by);
-    const auto is_stopped = [&] { return options.stop_requested && options.stop_requested->load(std::memory_order_relaxed); };
     Record record = trace(scene, plan_, MaterialMap(scene), *walk_, [&](double, double) { return !is_stopped(); });
     read_probes(scene, *walk_, record);
     if (rough && !is_stopped()) walk_->rest();  // what other toughnesses and moduli need is known for the most part
+    walk_->end_where({});
     record.steps = walk_->equilibria() - known;
     record.points = walk_->points();
     record.scene_text = scene.text;

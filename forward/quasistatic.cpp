@@ -140,6 +140,11 @@ int Quasistatic::last_time_before(double time) const {
 
 Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nullptr; }
 
+void Quasistatic::end_where(std::function<bool()> stopped) {
+    if (coarse_) coarse_->walk.stopped_ = stopped;
+    stopped_ = std::move(stopped);
+}
+
 bool Quasistatic::fail() {
     failure_ = "no equilibrium was found";
     if (!plan_.linear && failed_time_ > 0) failure_ += fmt::format(" at {:.4g} s", time_of(failed_time_));
@@ -440,6 +445,7 @@ bool Quasistatic::solve_for(std::size_t number, int time) {
         double potential = from.potential;
         double power = from.power;
         for (int part = 1; part <= parts && good; ++part) {
+            if (is_stopped()) return false;
             good = solve_from(potential, power, equilibrium_.time(), time_at(static_cast<double>(part) / parts));
             potential = equilibrium_.potential();
             power = equilibrium_.power();
@@ -501,6 +507,7 @@ void Quasistatic::forget_guesses() {
 
 // Finds the equilibrium of a place at a time.
 bool Quasistatic::find(std::size_t number, int time) {
+    if (is_stopped()) return false;
     Place& place = places_[number];
     std::size_t known = 0;  // states to begin from
     for (const Place& any : places_) known += any.known.size();
@@ -509,7 +516,7 @@ bool Quasistatic::find(std::size_t number, int time) {
     const auto [second, good] =
         on_both_grids([&] { return coarse_->walk.follow_leader(number) && coarse_->walk.know(number, time); },
                       [&] { return at_rest || solve_for(number, time); });
-    if (!second) return false;
+    if (!second || (!good && is_stopped())) return false;
     if (at_rest) {
         // Without load nothing has moved; what is held by bodies that do not press yet is in equilibrium all the same.
         place.known[0] = {0, std::vector<Vec2>(place.snapshot->displacement.size(), Vec2::Zero()), 0.0, 0.0};

@@ -48,6 +48,9 @@ class Quasistatic {
     /// roughly.
     void set_rough(bool rough);
 
+    /// From now on asked before each equilibrium: where it says true no further one is found, as where there is none.
+    void end_where(std::function<bool()> stopped);
+
     /// Waits for the derivatives that are being found, and gives back what only finds them, until equilibria are found again.
     void rest();
 
@@ -178,6 +181,7 @@ class Quasistatic {
     Critical critical_of_front(int number, const MaterialMap& materials, double now, double until, bool closely);
     int time_until(double now) const;
     bool fail();
+    bool is_stopped() const { return stopped_ && stopped_(); }
     Quasistatic* coarse() const;
     bool know(std::size_t number, int time);
     bool know_exactly(std::size_t number, int time);
@@ -235,6 +239,7 @@ class Quasistatic {
     std::map<unsigned, double> tried_;  // by front: its critical time when it was tried last, times `drive` then
     std::vector<double> times_;         // at which equilibria are known [s]
     int last_time_ = 0;                 // number of the last of them
+    std::function<bool()> stopped_;
     std::string failure_;
     int failed_time_ = 0;  // the last one without an equilibrium
     int equilibria_ = 0;

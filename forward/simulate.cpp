@@ -320,6 +320,7 @@ Record run_in_time(const Scene& scene, const Plan& plan, const MaterialMap& mate
 Record run_quasistatic(const Scene& scene, const Plan& plan, const MaterialMap& materials, const Discretisation& body,
                        const SimulateOptions& options) {
     Quasistatic walk(scene, plan, materials, body, {}, options.threads);
+    walk.end_where([&options] { return is_stopped(options); });
     const auto go_on = [&](double time, double crack_length) {
         if (options.progress) {
             const double by_time = time / plan.end_time;

@@ -76,7 +76,9 @@ class Tracer {
 
     Record run() {
         follow();
-        if (!walk_.failure().empty() && goes_on_left_ && record_.message != met) {  // pieces that hold no longer
+        if (record_.message != met && go_on_ && !go_on_(last_.load.time, length_of(last_))) {
+            end(RunStatus::interrupted, "stopped by the user");
+        } else if (!walk_.failure().empty() && goes_on_left_ && record_.message != met) {  // pieces that hold no longer
             split();
         } else if (!walk_.failure().empty() && record_.message != met && record_.status != RunStatus::split) {
             record_.status = RunStatus::unstable;

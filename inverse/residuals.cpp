@@ -361,6 +361,7 @@ void Comparison::add_curves(const Experiment& experiment) {
         return;
     }
     abscissa_ = by_time_ ? data.time : data.displacement;
+    tell_of_rows_without_place(experiment);
     const auto& materials = experiment.scene.materials;
     const bool remembers = std::ranges::any_of(materials, [](const auto& material) { return material.second.remembers(); });
     may_relax_ = !by_time_ && remembers;
@@ -378,6 +379,23 @@ void Comparison::add_curves(const Experiment& experiment) {
     }
     if (measured(data.crack_length)) {
         add_crack_stations(experiment);
+    }
+}
+
+// Nothing says where the model has to be compared with them.
+void Comparison::tell_of_rows_without_place(const Experiment& experiment) {
+    const Curves& data = experiment.data;
+    const auto has = [](const std::vector<double>& column, std::size_t i) { return !column.empty() && !std::isnan(column[i]); };
+    std::size_t lost = 0, rows = 0;
+    for (std::size_t i = 0; i < abscissa_.size(); ++i) {
+        if (has(data.force, i) || has(data.crack_length, i)) {
+            ++rows;
+            lost += std::isnan(abscissa_[i]) ? 1 : 0;
+        }
+    }
+    if (lost > 0) {
+        remarks_.push_back(fmt::format("{}: {} of {} rows have no {} and are left out.", experiment.name, lost, rows,
+                                       by_time_ ? "time" : "displacement"));
     }
 }
 

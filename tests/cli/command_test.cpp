@@ -169,6 +169,43 @@ TEST(SystemCommand, InterruptedRunIsSaved) {
     }
 }
 
+// Between two rows there are many equilibria, each by itself a matter of a second.
+TEST(SystemCommand, InterruptedBetweenTwoRowsOfAWheel) {
+    Command command;
+    command.folder.write("scene.toml", R"(
+[model]
+plane = "stress"
+thickness = "10 mm"
+cell = "0.05 mm"
+[specimen]
+size = ["12 mm", "14 mm"]
+material = "EW"
+[materials]
+EW = { kind = "isotropic", E = "40 MPa", nu = 0.33, density = "300 kg/m^3", toughness = "100 J/m^2" }
+[[edges]]
+side = "bottom"
+velocity = ["0 m/s", "0 m/s"]
+[[bodies]]
+name = "wheel"
+circle = { centre = ["6 mm", "16 mm"], radius = "2 mm" }
+velocity = ["0 m/s", "-1 mm/min"]
+[stop]
+displacement = "0.4 mm"
+[output]
+samples = 1
+)");
+    command.start({"simulate", command.path("scene.toml"), "-o", command.path("record.h5"), "--log", command.path("log.txt")});
+    EXPECT_TRUE(command.wait_for("log.txt", "scene is read"));
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    command.send(SIGINT);
+    const Outcome outcome = command.finish();
+    EXPECT_EQ(outcome.status, 130) << outcome.error;
+    const Record record = read_record(command.path("record.h5"));
+    EXPECT_EQ(record.status, RunStatus::interrupted);
+    EXPECT_EQ(record.message.rfind("stopped by the user", 0), 0U) << record.message;
+    EXPECT_FALSE(record.series.empty());
+}
+
 TEST(SystemCommand, LogIsAppendedWithTimes) {
     Command command;
     command.folder.write("scene.toml", small_scene);

@@ -124,6 +124,20 @@ TEST(UnitStudy, Read) {
     EXPECT_EQ(study.uncertainty.posterior, 2000);
 }
 
+// A camera's rows know the time alone; those before and after the other instrument's get no place.
+TEST(UnitStudy, RowsWithoutADisplacementArePlacedByTime) {
+    const StudyFolder folder;
+    folder.write("wedge_1.csv", "time [s],displacement [mm],force [N],crack_length [mm]\n"
+                                "1,,,1\n2,0.1,5,\n2.5,,,1\n4,0.2,6,\n4,,,2\n5,0.4,6,\n4.25,,,2\n6,,,3\n,,4,\n");
+    const std::vector<double> placed = folder.read(good_study).experiments[0].data.displacement;
+    const std::vector<double> expected{NAN, 0.1e-3, 0.125e-3, 0.2e-3, 0.2e-3, 0.4e-3, 0.25e-3, NAN, NAN};
+    ASSERT_EQ(placed.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_EQ(std::isnan(placed[i]), std::isnan(expected[i])) << i;
+        EXPECT_TRUE(std::isnan(expected[i]) || std::abs(placed[i] - expected[i]) < 1e-12) << i << " " << placed[i];
+    }
+}
+
 TEST(UnitStudy, OverridesOfTheStudyAndOfItsScenes) {
     const StudyFolder folder;
     const Study study = folder.read(good_study, {{"optimizer.starts", "7"},

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -398,6 +399,21 @@ TEST(UnitResiduals, GapsAreSkipped) {
         EXPECT_NEAR(station.measured, 1e5 * station.at, 1e-9);
         EXPECT_FALSE(station.at > 0.262e-3 && station.at < 0.488e-3) << station.at;
     }
+}
+
+TEST(UnitResiduals, RowsWithoutAPlaceAreToldOf) {
+    Experiment experiment = straight_experiment();
+    const auto told = [&] {
+        const Comparison comparison(experiment);
+        return std::ranges::any_of(comparison.remarks(), [](const std::string& remark) {
+            return remark.starts_with("test: 3 of ") && remark.ends_with(" rows have no displacement and are left out.");
+        });
+    };
+    EXPECT_FALSE(told());
+    for (const std::size_t i : {3U, 40U, 41U}) {
+        experiment.data.displacement[i] = std::nan("");
+    }
+    EXPECT_TRUE(told());
 }
 
 // The chord across a gap is nobody's measurement. Of a curve of second order it is off by up to a tenth of its range here.
