@@ -36,6 +36,12 @@ constexpr double safety = 1.25;  // Roache's, for three grids
 constexpr double least_power = 0.5;
 constexpr double most_power = 2.0;
 
+// A crack that kinks by more than this (cosine) turns across the lines of the grid: what it releases then is off by a part that
+// comes and goes with the tip's place in a cell, so that two grids may agree by chance. It goes with the first power at best.
+constexpr double kinked = 0.985;
+constexpr double most_power_at_kinks = 1.0;
+constexpr double finer_at_kinks = 1.25;  // cells, where a run on the chosen grid shows it to be off by more than was asked
+
 // Time as a power of the cells to a side, as the two finest grids tried show it: between what little grids cost anyway, and cells
 // times stations or factorisation.
 constexpr double least_power_of_time = 1.0;
@@ -50,6 +56,7 @@ struct Trial {
     double cells;  // across the smaller side
     std::vector<Quantity> quantities;
     double seconds;
+    bool kinks;  // a crack, as it grows
 };
 
 Scene with_cells(Scene scene, double cells) {
@@ -69,13 +76,27 @@ std::vector<Quantity> quantities_of(const Record& record) {
     }
     if (loaded && loaded->force != 0.0)
         found.push_back({"force over displacement before growth", loaded->force / loaded->displacement});
-    if (record.driving.empty()) {
+    if (record.driving.empty() || record.series.back().crack_length <= start) {  // where the crack would grow is not of this run
         if (record.series.back().G > 0.0) found.push_back({"energy release rate", record.series.back().G});
     } else {
         found.push_back({"displacement at first growth", record.driving.front().displacement});
         if (largest > 0.0) found.push_back({"largest force", largest});
     }
     return found;
+}
+
+bool kinks(const Scene& scene, const Record& record) {
+    for (std::size_t k = 0; k < scene.cracks.size(); ++k) {
+        const std::vector<Vec2>&before = scene.cracks[k].points, &path = record.paths[k];
+        const auto turns = [](const Vec2& from, const Vec2& tip, const Vec2& to) {
+            return to != tip && (tip - from).normalized().dot((to - tip).normalized()) < kinked;
+        };
+        const auto old = std::ranges::search(path, before);  // within it
+        if (old.empty()) continue;
+        if (old.begin() != path.begin() && turns(before[1], before[0], *std::prev(old.begin()))) return true;
+        if (old.end() != path.end() && turns(before[before.size() - 2], before.back(), *old.end())) return true;
+    }
+    return false;
 }
 
 // Not where the grid is too coarse for anything.
@@ -90,14 +111,14 @@ bool bridges_voids(const Scene& scene, double cells) {
 }
 
 // Nothing where the grid is too coarse for the scene: an edge or a body then finds no node, or no equilibrium is found.
-std::optional<Trial> try_grid(const Scene& scene, double cells) {
+std::optional<Trial> try_grid(const Scene& scene, double cells, bool extrapolate = false) {
     Scene coarse = with_cells(scene, cells);
     coarse.output.frames = 0;
     coarse.output.samples = 50;
-    coarse.solver.extrapolate = false;  // or the change from grid to grid would not tell the error
+    coarse.solver.extrapolate = extrapolate;  // or the change from grid to grid would not tell the error
     try {
         const Record record = simulate(coarse);
-        Trial trial{cells, quantities_of(record), record.seconds};
+        Trial trial{cells, quantities_of(record), record.seconds, kinks(coarse, record)};
         const bool good = std::all_of(trial.quantities.begin(), trial.quantities.end(),
                                       [](const Quantity& q) { return std::isfinite(q.value); });
         if (record.status == RunStatus::unstable || trial.quantities.empty() || !good) return {};
@@ -142,8 +163,11 @@ std::vector<Estimate> estimates_of(const Trial& coarse, const Trial& middle, con
         const auto a = in(coarse), b = in(middle);
         if (a == coarse.quantities.end() || b == middle.quantities.end() || q.value == 0.0) continue;
         const double first = std::abs((a->value - b->value) / q.value), second = std::abs((b->value - q.value) / q.value);
-        const double power = second == 0.0 ? most_power : std::clamp(std::log2(first / second), least_power, most_power);
-        const double at_finest = safety * second / (std::pow(2.0, power) - 1.0);
+        const bool at_kinks = coarse.kinks || middle.kinks || fine.kinks;
+        const double highest = at_kinks ? most_power_at_kinks : most_power;
+        const double power = second == 0.0 ? highest : std::clamp(std::log2(first / second), least_power, highest);
+        const double seen = at_kinks ? std::max(second, std::pow(0.5, most_power_at_kinks) * first) : second;
+        const double at_finest = safety * seen / (std::pow(2.0, power) - 1.0);
         const double coarse_off = std::abs(a->value / q.value - 1.0) + at_finest, middle_off = second + at_finest;
         found.push_back({q.name, at_finest, power, fine.cells, {{{coarse.cells, coarse_off}, {middle.cells, middle_off}}}});
     }
@@ -162,6 +186,21 @@ double least_cells(const Scene& scene, double advances_a_cell) {
         if (crack.grows != Growth::none && crack.advance > 0.0)
             cells = std::max(cells, scene.specimen.size.minCoeff() / (advances_a_cell * crack.advance));
     return multiple * std::ceil(cells / multiple - 1e-9);
+}
+
+// How far off a run as it will be is from the finest grid tried, with what that one may be off itself.
+std::optional<Quantity> seen_off(const Scene& scene, double cells, const Trial& fine, const std::vector<Estimate>& estimates) {
+    const auto trial = try_grid(scene, cells, scene.solver.extrapolate);
+    if (!trial) return {};
+    Quantity worst{"", 0.0};
+    for (const Estimate& estimate : estimates) {
+        const auto same = [&](const Quantity& q) { return q.name == estimate.name; };
+        const auto here = std::ranges::find_if(trial->quantities, same), there = std::ranges::find_if(fine.quantities, same);
+        if (here == trial->quantities.end()) return {};
+        const double off = std::abs(here->value / there->value - 1.0) + estimate.at_finest;
+        if (off > worst.value) worst = {estimate.name, off};
+    }
+    return worst;
 }
 
 // The fewest cells that meet the error, from `least` on; more than `most_cells_chosen` where none do.
@@ -285,12 +324,19 @@ GridChoice choose_grid(const Scene& scene, double error) {
                        ? ", or an advance to a crack that grows through rings without one"
                        : ""));
     if (error < least_for_bands) chosen = cells_for_bands(scene, chosen);
+    const Trial& finest = trials.back();
+    std::optional<Quantity> off;
+    while (finest.kinks && chosen < finest.cells && (off = seen_off(scene, chosen, finest, estimates)) && off->value > error) {
+        chosen = multiple * std::ceil(finer_at_kinks * chosen / multiple);
+        off.reset();
+    }
     const Estimate& worst = worst_of(estimates, chosen);
     GridChoice choice;
     choice.cell = scene.specimen.size.minCoeff() / chosen;
     choice.error = worst.at(chosen);
     choice.quantity = worst.name;
-    choice.seconds = seconds_on(scene, chosen, trials[trials.size() - 2], trials.back());
+    if (off && off->value > choice.error) choice.error = off->value, choice.quantity = off->name;
+    choice.seconds = seconds_on(scene, chosen, trials[trials.size() - 2], finest);
     choice.seconds_spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     choice.text = fmt::format(
         "{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "

@@ -20,7 +20,9 @@ struct GridChoice {
 /// crack moves, G at a crack that stands, the displacement at which one that grows moves first, and the largest force. Of each
 /// the error is taken to go as a power of the cell, and that of the finest to be 1.25 d / (2^p - 1), d its change from the grid
 /// before, p the power that the two changes show, between 1/2 and 2 (the grid convergence index; Roache 1994, eq. 3 and 8).
-/// Throws InputError naming model.error where the scene is not at equilibrium or no grid of a bearable size meets it.
+/// Where a crack kinks, p is 1 at most, d no less than half of the change before, and the grid is chosen as fine as it takes to
+/// be as near to the finest one tried. Throws InputError naming model.error where the scene is not at equilibrium or no grid of a
+/// bearable size meets it.
 GridChoice choose_grid(const Scene& scene, double error);
 
 }  // namespace crampfit

@@ -138,6 +138,11 @@ int Quasistatic::last_time_before(double time) const {
     return std::max(0, static_cast<int>(beyond - times_.begin()) - 1);
 }
 
+double Quasistatic::next_time(double time) const {
+    const auto beyond = std::ranges::upper_bound(times_, time);
+    return beyond == times_.end() ? std::numeric_limits<double>::infinity() : *beyond;
+}
+
 Quasistatic* Quasistatic::coarse() const { return coarse_ ? &coarse_->walk : nullptr; }
 
 void Quasistatic::end_where(std::function<bool()> stopped) {

@@ -79,6 +79,9 @@ class Quasistatic {
     /// Whether an equilibrium of a station is known at a time, or found.
     bool can_stand(std::size_t station, double time);
 
+    /// The first time beyond this at which equilibria are known, not interpolated [s]; infinite: there is none.
+    double next_time(double time) const;
+
     /// What the scene's probes read there then [readings] [m]; empty where there is no equilibrium.
     std::vector<Vec2> probes_at(std::size_t station, double time);
 

@@ -308,9 +308,9 @@ class Tracer {
 
     // The crack stands while the load rises, or until an equilibrium is missing.
     void stand(std::size_t i, Moment from, double until) {
-        for (double time = next_sample(from.load.time); time < until - rounding * sample_ && !done_; time = next_sample(time)) {
+        for (double time = next_look(from.load.time); time < until - rounding * sample_ && !done_; time = next_look(time)) {
             const Moment to = moment(i, time);
-            go(from, to);
+            look(from, to);
             from = to;
             if (to.load.time < time) return;
         }
@@ -339,13 +339,28 @@ class Tracer {
             const Moment whole_way = moment(i, time);
             return share < 1.0 && walk_.can_stand(i - 1, time) ? mixed(moment(i - 1, time), whole_way, share) : whole_way;
         };
-        for (double time = next_sample(start); time < until - rounding * sample_ && !done_; time = next_sample(time)) {
+        for (double time = next_look(start); time < until - rounding * sample_ && !done_; time = next_look(time)) {
             const Moment to = at(time);
-            go(from, to);
+            look(from, to);
             from = to;
             if (to.load.time < time) return;
         }
         if (!done_ && until > from.load.time) go(from, at(until));
+    }
+
+    // Where forces are not straight lines, their work is that of all equilibria, however few rows there are.
+    double next_look(double time) {
+        const double sample = next_sample(time);
+        if (plan_.linear) return sample;
+        const double known = walk_.next_time(time + rounding * sample_);
+        return known < sample - rounding * sample_ ? known : sample;
+    }
+
+    // From one moment to a later one; a row only where it is due.
+    void look(const Moment& from, const Moment& to) {
+        const bool ends = beyond_length(to) || beyond_displacement(to) || beyond_time(to);
+        if (!ends && to.load.time < next_sample(from.load.time) - rounding * sample_) pass(to, false);
+        else go(from, to);
     }
 
     // There is one where some or all motion ends: the load's power goes in a step there.
@@ -382,28 +397,34 @@ class Tracer {
             history.K_II.push_back(tip.K_II);
         }
         for (std::size_t d = 0; d < record_.reactions.size(); ++d) record_.reactions[d].force.push_back(m.load.reactions[d]);
-        const double stored = m.load.potential + m.load.traction_work;  // and dissipated
-        row.strain_energy = stored - m.load.dissipated;
+        pass(m, jumped);
+        row.strain_energy = m.load.potential + m.load.traction_work - m.load.dissipated;
         row.fracture_energy = m.fracture_energy;
+        row.external_work = work_;
+        record_.series.push_back(row);
+    }
+
+    // Work done on the way there, and the books.
+    void pass(const Moment& m, bool jumped) {
+        const double stored = m.load.potential + m.load.traction_work;  // and dissipated
         if (!record_.series.empty()) {
             const Moment& before = last_;
             double work = m.load.traction_work - before.load.traction_work;
             for (int d = 0; d < static_cast<int>(m.load.reactions.size()); ++d)
                 work += 0.5 * (before.load.reactions[d] + m.load.reactions[d])
                                   .dot(walk_.boundary().travel(d, m.load.time) - walk_.boundary().travel(d, before.load.time));
-            row.external_work = record_.series.back().external_work + work;
+            work_ += work;
             // A jump turns what it releases beyond the toughness into motion, which is not followed.
             if (!jumped)
                 imbalance_ += work - (stored - before.load.potential - before.load.traction_work) -
                               (m.fracture_energy - before.fracture_energy);
             largest_imbalance_ = std::max(largest_imbalance_, std::abs(imbalance_));
-            largest_energy_ = std::max({largest_energy_, std::abs(row.external_work), stored});
+            largest_energy_ = std::max({largest_energy_, std::abs(work_), stored});
         } else {
-            row.external_work = stored;  // what stays was laid on slowly
+            work_ = stored;  // what stays was laid on slowly
         }
         last_ = m;
         most_power_ = std::max(most_power_, std::abs(m.load.power));
-        record_.series.push_back(row);
     }
 
     void end(RunStatus status, const char* message) {
@@ -467,6 +488,7 @@ class Tracer {
     bool done_ = false;
     bool runs_on_ = false;       // to where an equilibrium is missing
     bool goes_on_left_ = false;  // no tip can grow any more, but the specimen carries on
+    double work_ = 0;            // external [J]
     double imbalance_ = 0;
     double largest_imbalance_ = 0;
     double largest_energy_ = 0;
