@@ -15,6 +15,7 @@ constexpr double power_step = 0.25, highest_power = 1.5;
 constexpr int least_points = 8;       // on either side of the tip
 constexpr double least_freedom = 10;  // neighbours go along where the model misses something, too
 constexpr double least_gain = 25;     // of the F statistic: a crack is no chance
+constexpr double own_motion = 0.1;    // of the wood from place to place, beside what changes slowly [px]
 
 /// r^p behind the tip and 0 ahead, blurred, r over `length`; at every part of a pixel from -length to length.
 class BlurredPower {
@@ -59,6 +60,23 @@ Eigen::VectorXd residuals(const Rows& rows, const Eigen::VectorXd& opening, cons
     Eigen::Matrix<double, Rows::ColsAtCompileTime, Rows::ColsAtCompileTime> normal = weighted * rows;
     normal.diagonal().array() += 1e-9 * weights.sum();
     return opening - rows * normal.ldlt().solve(weighted * opening);
+}
+
+/// How much a place has to say: where the gray changes fast along the line, as at a ring's border, the least motion of the wood
+/// passes for light that is missing.
+Eigen::VectorXd weights_of(const OpeningProfile& profile) {
+    const std::size_t count = profile.opening.size();
+    std::vector<double> bends;
+    for (std::size_t i = 1; i + 1 < count; ++i)
+        bends.push_back(std::abs(profile.opening[i - 1] - 2 * profile.opening[i] + profile.opening[i + 1]));
+    std::ranges::nth_element(bends, bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2));
+    const double noise = 1.4826 * bends[bends.size() / 2] / std::sqrt(6.0);  // three places make a bend
+    Eigen::VectorXd weights(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double by_motion = own_motion * profile.along[i];
+        weights[static_cast<Eigen::Index>(i)] = 1 / (1 + std::pow(by_motion / std::max(noise, 1e-6), 2));
+    }
+    return weights;
 }
 
 /// Tukey's biweight (Beaton and Tukey 1974), 95 % efficient for Gaussian noise.
@@ -108,10 +126,12 @@ std::optional<OpeningStart> find_opening_start(const OpeningProfile& profile) {
     if (count < 2 * least_points + 1) return std::nullopt;
     const Eigen::VectorXd opening = Eigen::Map<const Eigen::VectorXd>(profile.opening.data(), count);
     const Rows rows = other_rows(profile);
-    Eigen::VectorXd weights = Eigen::VectorXd::Ones(count);
+    const Eigen::VectorXd known = weights_of(profile);
+    Eigen::VectorXd weights = known;
     std::vector<Fitted> all = fit_all(rows, opening, weights);
     for (int i = 0; i < 2; ++i) {
-        weights = tukey_weights(std::ranges::min_element(all, {}, &Fitted::squares)->left);
+        const Eigen::VectorXd& left = std::ranges::min_element(all, {}, &Fitted::squares)->left;
+        weights = known.cwiseProduct(tukey_weights(known.cwiseSqrt().cwiseProduct(left)));
         all = fit_all(rows, opening, weights);
     }
     const Fitted& best = *std::ranges::min_element(all, {}, &Fitted::squares);
