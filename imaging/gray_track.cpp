@@ -25,10 +25,17 @@ constexpr double most_left = 0.7;       // of the reference's contrast, in pictu
 constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
 constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
 constexpr double slack = 3;             // of the line's middle [px]
+constexpr double edge = 6;              // of the ground, by the lens and what of it is not even [px]
 constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
 
 cv::Mat pixels_of(const FinePicture& picture) {
     return cv::Mat(picture.rows, picture.columns, CV_32F, const_cast<float*>(picture.gray.data())).clone();
+}
+
+double length_of(const std::vector<cv::Point2d>& line) {
+    double length = 0;
+    for (std::size_t i = 1; i < line.size(); ++i) length += cv::norm(line[i] - line[i - 1]);
+    return length;
 }
 
 /// Points a pixel apart along a line.
@@ -124,6 +131,21 @@ DarkWay moved(DarkWay way, const Alignment& from, const Alignment& to) {
     return way;
 }
 
+/// Where a way leaves the ground about the specimen: of a notch that has opened its flanks darken, too. `room`: from each place
+/// to the ground [px].
+std::size_t mouth_of(const DarkWay& way, const cv::Mat& room) {
+    std::size_t i = 0;
+    double widest = 0;
+    const auto at_ground = [&](const cv::Point2d& p) {
+        const int x = std::clamp(static_cast<int>(std::lround(p.x)), 0, room.cols - 1);
+        const int y = std::clamp(static_cast<int>(std::lround(p.y)), 0, room.rows - 1);
+        widest = std::max(widest, way.half_width[i]);
+        return room.at<float>(y, x) <= widest + edge;
+    };
+    while (i + 2 < way.points.size() && at_ground(way.points[i])) ++i;
+    return i;
+}
+
 std::vector<Vec2> vectors(const std::vector<cv::Point2d>& points) {
     std::vector<Vec2> result;
     for (const cv::Point2d& point : points) result.emplace_back(point.x, point.y);
@@ -136,6 +158,7 @@ struct GrayTracker::State {
     Silhouette silhouette;
     cv::Mat reference = {};
     cv::Mat allowed = {};  // 0 on a dark ground around the specimen and where masked
+    cv::Mat room = {};     // from each place to that ground [px]
     double contrast = 0;
 };
 
@@ -144,6 +167,7 @@ GrayTracker::GrayTracker(const FinePicture& reference, const std::vector<std::ui
     state->reference = pixels_of(reference);
     state->allowed =
         cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(state->silhouette.mask().data())).clone();
+    cv::distanceTransform(state->allowed, state->room, cv::DIST_L2, cv::DIST_MASK_5);
     if (!mask.empty())
         state->allowed &= cv::Mat(reference.rows, reference.columns, CV_8U, const_cast<std::uint8_t*>(mask.data())) != 0;
     cv::Scalar mean, deviation;
@@ -197,9 +221,12 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     found.status = TipStatus::ok;
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);
-    const cv::Point2d front = way->points.front(), outward = direction_at(way->points, false, heading);
-    found.length = state_->silhouette.to_edge({front.x, front.y}, {outward.x, outward.y}) + tip->along;
+    const auto mouth = static_cast<std::ptrdiff_t>(mouth_of(*way, state_->room));
+    const std::vector<cv::Point2d> flank(way->points.begin(), way->points.begin() + mouth + 1);
     std::vector<cv::Point2d> points = closed_way(reference, image, weight, whole, *way);
+    points.erase(points.begin(), points.begin() + mouth);
+    const cv::Point2d front = points.front(), outward = direction_at(points, false, heading);
+    found.length = state_->silhouette.to_edge({front.x, front.y}, {outward.x, outward.y}) + tip->along - length_of(flank);
     points.resize(points.size() > behind ? points.size() - behind : 0);
     points.insert(points.end(), tip->last.begin(), tip->last.end());
     found.way = vectors(points);

@@ -365,8 +365,9 @@ void Comparison::add_curves(const Experiment& experiment) {
     const auto& materials = experiment.scene.materials;
     const bool remembers = std::ranges::any_of(materials, [](const auto& material) { return material.second.remembers(); });
     may_relax_ = !by_time_ && remembers;
-    if (may_relax_ && measured(data.time)) {
-        tell_of_hold(experiment);
+    const bool moves = !by_time_ && experiment.scene.solver.kind == SolverKind::explicit_dynamics;
+    if ((may_relax_ || moves) && measured(data.time)) {
+        tell_of_hold(experiment, moves ? "in motion" : "of wood that remembers");
     }
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
     check_rises(experiment, abscissa_, abscissa_noise_, by_time_ ? "time" : "displacement");
@@ -400,7 +401,7 @@ void Comparison::tell_of_rows_without_place(const Experiment& experiment) {
 }
 
 // Rows at one displacement count as few there, whatever the wood does meanwhile.
-void Comparison::tell_of_hold(const Experiment& experiment) {
+void Comparison::tell_of_hold(const Experiment& experiment, const char* where) {
     constexpr double plain = 0.25;  // of the rows
     std::vector<double> places = abscissa_;
     std::erase_if(places, [](double place) { return std::isnan(place); });
@@ -410,19 +411,19 @@ void Comparison::tell_of_hold(const Experiment& experiment) {
     }
     const double window = smoothing_window * (places.back() - places.front());
     std::ptrdiff_t most = 0;
-    double where = 0;
+    double at = 0;
     for (auto first = places.begin(), last = first; first != places.end(); ++first) {
         last = std::find_if(last, places.end(), [&](double place) { return place > *first + window; });
         if (last - first > most) {
             most = last - first;
-            where = *first;
+            at = *first;
         }
     }
     if (static_cast<double>(most) > plain * static_cast<double>(places.size())) {
         remarks_.push_back(
-            fmt::format("{}: {} of {} rows stand at {:.3g} mm and count as those of another place do; of wood that remembers "
-                        "they tell more by time: leave displacement out.",
-                        experiment.name, most, places.size(), 1e3 * where));
+            fmt::format("{}: {} of {} rows stand at {:.3g} mm and count as those of another place do; {} they tell more by time: "
+                        "leave displacement out.",
+                        experiment.name, most, places.size(), 1e3 * at, where));
     }
 }
 
