@@ -304,6 +304,8 @@ Fit fit_study(const Study& as_given, const FitOptions& options) {
             exploration = look_around(uncertainty);
         }
         const Run best = *objective.best();
+        const Run& about = wide.valid() ? looked_at : uncertainty.best;
+        const Evaluation there = !own ? Evaluation() : wide.valid() ? wide.get() : before.at(about.x);
         fit.status = objective.stopped() ? FitStatus::interrupted : found.converged ? FitStatus::converged : FitStatus::run_limit;
         fit.message = explain(fit.status);
         fill_parameters(fit, box, best.x, uncertainty);
@@ -313,8 +315,6 @@ Fit fit_study(const Study& as_given, const FitOptions& options) {
         }
         fill_exploration(fit, box, uncertainty, exploration);
         if (own) {
-            const Run& about = wide.valid() ? looked_at : uncertainty.best;
-            const Evaluation there = wide.valid() ? wide.get() : before.at(about.x);
             if (there.usable() && uncertainty.slope.size() > 0) {
                 take_in_grid(fit, box, best.x, left_by_grid(study, model, about, there, uncertainty));
             } else {
