@@ -369,6 +369,10 @@ void Comparison::add_curves(const Experiment& experiment) {
     if ((may_relax_ || moves) && measured(data.time)) {
         tell_of_hold(experiment, moves ? "in motion" : "of wood that remembers");
     }
+    if (std::ranges::any_of(materials, [](const auto& material) { return material.second.viscoelastic.has_value(); }) &&
+        !by_time_ && measured(data.force)) {
+        tell_of_creep(experiment);
+    }
     abscissa_noise_ = (by_time_ ? experiment.noise.time : experiment.noise.displacement).value_or(0.0);
     check_rises(experiment, abscissa_, abscissa_noise_, by_time_ ? "time" : "displacement");
     if (abscissa_noise_ > 0) {
@@ -397,6 +401,35 @@ void Comparison::tell_of_rows_without_place(const Experiment& experiment) {
     if (lost > 0) {
         remarks_.push_back(fmt::format("{}: {} of {} rows have no {} and are left out.", experiment.name, lost, rows,
                                        by_time_ ? "time" : "displacement"));
+    }
+}
+
+// Force at displacements says nothing of how displacements creep.
+void Comparison::tell_of_creep(const Experiment& experiment) {
+    constexpr double one_force = 0.05, plain = 0.9;  // of the largest; of the rows
+    const std::vector<double>& force = experiment.data.force;
+    double most = 0;
+    for (const double f : force) {
+        most = std::max(most, std::isnan(f) ? 0.0 : std::abs(f));
+    }
+    double low = INFINITY, high = -INFINITY, largest = 0;  // displacements of these rows; of all
+    std::ptrdiff_t held = 0, rows = 0;
+    for (std::size_t i = 0; i < force.size(); ++i) {
+        if (std::isnan(force[i]) || std::isnan(abscissa_[i])) {
+            continue;
+        }
+        ++rows;
+        largest = std::max(largest, std::abs(abscissa_[i]));
+        if (std::abs(force[i]) > (1 - one_force) * most) {
+            ++held;
+            low = std::min(low, abscissa_[i]);
+            high = std::max(high, abscissa_[i]);
+        }
+    }
+    if (static_cast<double>(held) > plain * static_cast<double>(rows) && high - low > one_force * largest) {
+        remarks_.push_back(fmt::format("{}: {} of {} rows have one force, as in a creep test: what is compared is force at each "
+                                       "displacement, which says nothing of how that grows with time.",
+                                       experiment.name, held, rows));
     }
 }
 

@@ -91,6 +91,7 @@ class Comparison {
     void add_path_stations(const Experiment& experiment);
     std::vector<double> on_path(const Record& record, double slack_force) const;
     void tell_of_rows_without_place(const Experiment& experiment);
+    void tell_of_creep(const Experiment& experiment);
     void tell_of_hold(const Experiment& experiment, const char* where);
     void tell_of_spikes(const Experiment& experiment, const Curve& rows);
     void count_hold(Curve& rows) const;

@@ -736,6 +736,24 @@ void expect_refused(const Experiment& experiment, const std::string& key) {
     }
 }
 
+TEST(UnitResiduals, ACreepTestIsToldOf) {
+    Experiment experiment = straight_experiment();
+    experiment.scene.materials["EW"].viscoelastic.emplace();
+    const auto told = [&] {
+        return std::ranges::any_of(Comparison(experiment).remarks(), [](const std::string& remark) {
+            return remark.find("says nothing of how that grows with time") != std::string::npos;
+        });
+    };
+    EXPECT_FALSE(told());
+    experiment.data.crack_length.clear();
+    for (double& force : experiment.data.force) {
+        force = 20;
+    }
+    EXPECT_TRUE(told());
+    experiment.scene.materials["EW"].viscoelastic.reset();
+    EXPECT_FALSE(told());
+}
+
 TEST(UnitResiduals, RefusesDataThatCannotBeCompared) {
     Experiment experiment = straight_experiment();
     experiment.data_file = "bad.csv";
