@@ -340,8 +340,10 @@ GridChoice choose_grid(const Scene& scene, double error) {
     choice.seconds_spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     choice.text = fmt::format(
         "{:<15} {:.2g} % estimated, of {}; {:g} % asked for\n{:<15}   because: {:g} cells across change it by little enough "
-        "from grid to grid, going with the power {:.2g} of the cell\n{:<15} about {:.2g} s for the whole run\n",
-        "error", 100 * choice.error, choice.quantity, 100 * error, "", chosen, worst.power, "", choice.seconds);
+        "from grid to grid, going with the power {:.2g} of the cell{}\n{:<15} about {:.2g} s for the whole run\n",
+        "error", 100 * choice.error, choice.quantity, 100 * error, "", chosen, worst.power,
+        off ? fmt::format("; a crack kinks, and a run on them is compared with one on {:g}", finest.cells) : "", "",
+        choice.seconds);
     return choice;
 }
 

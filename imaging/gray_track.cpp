@@ -19,13 +19,13 @@ constexpr double likely_about_tip = 3;  // of the wood about the tip beside that
 constexpr double place_error = 1;       // of the wood's motion about the tip and of the line's middle [px]
 constexpr double about = 40;            // standard deviation of what that is taken from [px]
 // The wood about the tip of an opening crack goes ahead of it, by the root of the distance (Williams 1957): what it does so
-// within a standard deviation half as long tells how it would be lined up at the tip itself. Known to a part of that.
+// within a standard deviation half as long tells how it would be lined up at the tip itself. Known to half of that: a judgement.
 constexpr double nearer = 0.5, unsure = 0.5;
 constexpr double most_left = 0.7;       // of the reference's contrast, in pictures that lie on each other
 constexpr int behind = 80, ahead = 60;  // of where the line is lost: what the tip is found from [px]
 constexpr int side = 2;                 // of a strip, over which its wood is taken [px]
 constexpr double slack = 3;             // of the line's middle [px]
-constexpr double edge = 6;              // of the ground, by the lens and what of it is not even [px]
+constexpr double edge = 6;              // of the ground, by the lens and what of it is not even: a judgement [px]
 constexpr int heading = 40;             // of the line's last stretch, that says how it goes on [px]
 
 cv::Mat pixels_of(const FinePicture& picture) {
@@ -214,10 +214,12 @@ CrackTip GrayTracker::tip(const FinePicture& picture) const {
     const Alignment near_tip = line_up_about(tip->place, nearer * about, about_tip);
     const cv::Point2d nearer_by = about_tip.to_image(tip->place) - near_tip.to_image(tip->place);
     const double ahead_of_tip = std::clamp(nearer_by.dot(tip->direction) / (1 - std::sqrt(nearer)), 0.0, likely_about_tip);
-    Alignment at_tip = about_tip;
-    at_tip.map(0, 2) -= ahead_of_tip * tip->direction.x;
-    at_tip.map(1, 2) -= ahead_of_tip * tip->direction.y;
-    if (const std::optional<Tip> again = tip_as(at_tip)) tip = again;
+    if (ahead_of_tip > 0) {
+        Alignment at_tip = about_tip;
+        at_tip.map(0, 2) -= ahead_of_tip * tip->direction.x;
+        at_tip.map(1, 2) -= ahead_of_tip * tip->direction.y;
+        if (const std::optional<Tip> again = tip_as(at_tip)) tip = again;
+    }
     found.status = TipStatus::ok;
     found.tip = {tip->place.x, tip->place.y};
     found.angle = std::atan2(tip->direction.y, tip->direction.x);

@@ -15,7 +15,7 @@ constexpr double power_step = 0.25, highest_power = 1.5;
 constexpr int least_points = 8;       // on either side of the tip
 constexpr double least_freedom = 10;  // neighbours go along where the model misses something, too
 constexpr double least_gain = 25;     // of the F statistic: a crack is no chance
-constexpr double own_motion = 0.1;    // of the wood from place to place, beside what changes slowly [px]
+constexpr double own_motion = 0.1;    // of the wood from place to place, beside what changes slowly: a judgement [px]
 
 /// r^p behind the tip and 0 ahead, blurred, r over `length`; at every part of a pixel from -length to length.
 class BlurredPower {

@@ -8,7 +8,7 @@
 namespace crampfit {
 namespace {
 
-constexpr double rounding = 1e-12;  // of the mean: below it, a standard deviation is none
+constexpr double least_spread = 1e-12;  // of the mean: below it, a standard deviation is none
 
 // Values at A, B and A with a column of B, row by row, about their common mean: products lose fewer digits, and the
 // estimate of a first index scatters less (Sobol 2001).
@@ -48,7 +48,7 @@ double part_of_variance(const Rows& rows, std::span<const int> drawn, const Term
     const auto count = static_cast<double>(drawn.size());
     const double mean = sum / (2 * count);
     const double variance = sum_of_squares / (2 * count) - mean * mean;
-    const double least = rounding * (std::abs(rows.centre) + std::abs(mean));
+    const double least = least_spread * (std::abs(rows.centre) + std::abs(mean));
     return variance > least * least ? sum_of_terms / count / variance : 0.0;
 }
 

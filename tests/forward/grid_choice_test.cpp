@@ -118,12 +118,12 @@ TEST(VerificationGridChoice, ACrackThatKinks) {
     scene.cracks = {crack};
     scene.measure = {"top", "top"};
     scene.stop.displacement = 0.6e-3;
-    const double exact = simulate(scene).driving.front().displacement;
+    const double fine = simulate(scene).driving.front().displacement;
     for (const double asked : {0.05, 0.015}) {
         const GridChoice choice = choose_grid(scene, asked);
         Scene chosen = scene;
         chosen.model.cell = choice.cell;
-        const double error = std::abs(off_in_growth(simulate(chosen), exact));
+        const double error = std::abs(off_in_growth(simulate(chosen), fine));
         std::printf("kink, %.1f %% asked: cells of %.3f mm, %.2f %% estimated of %s, true error of the displacement at growth "
                     "%.2f %%\n",
                     100 * asked, 1e3 * choice.cell, 100 * choice.error, choice.quantity.c_str(), 100 * error);
