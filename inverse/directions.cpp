@@ -17,12 +17,24 @@ constexpr double resolution = 1e-3;
 // Next to the longest column: below that a slope is what rounding leaves of none.
 constexpr double least_length = 1e-9;
 
+// What of a slope's length no scatter is believed to make, next to the length that its standard errors add up to. That one is of
+// a sum of squares, which spreads by sqrt(2 / n) of itself where n residuals scatter each by itself; three of these are taken.
+// Where few runs tell, or few residuals scatter, n is small, and by n = 2 a slope must be twice as long as its error.
+double least_over_error(const LocalModel& model, const Eigen::VectorXd& weight) {
+    const Eigen::MatrixXd scatter = weight.asDiagonal() * model.scatter();
+    const Eigen::MatrixXd between_runs = scatter.transpose() * scatter;
+    const double squares = between_runs.squaredNorm();
+    // Satterthwaite (1946): tr(C)^2 / tr(C^2) of the residuals' covariance C; between runs, both are the same.
+    const double n = squares > 0 ? between_runs.trace() * between_runs.trace() / squares : 1.0;
+    return std::sqrt(1 + 3 * std::sqrt(2 / n));
+}
+
 // Which columns tell their parameter's effect from none. To scale the others to length one would make of their scatter an effect
 // as large as any, which no direction that it is mixed into could be told from.
-std::vector<Eigen::Index> columns_with_effect(const Eigen::VectorXd& length, const Eigen::VectorXd& error) {
+std::vector<Eigen::Index> columns_with_effect(const Eigen::VectorXd& length, const Eigen::VectorXd& error, double least) {
     std::vector<Eigen::Index> columns;
     for (Eigen::Index j = 0; j < length.size(); ++j) {
-        if (length[j] > std::max(least_length * length.maxCoeff(), 2 * error[j])) {
+        if (length[j] > std::max(least_length * length.maxCoeff(), least * error[j])) {
             columns.push_back(j);
         }
     }
@@ -40,7 +52,8 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius, c
     const Eigen::Index p = jacobian.cols();
     const Eigen::VectorXd length = jacobian.colwise().norm();
     const Eigen::VectorXd error = (weight.asDiagonal() * model.jacobian_errors()).colwise().norm();
-    const std::vector<Eigen::Index> told = columns_with_effect(length, error);
+    const double least = least_over_error(model, weight);
+    const std::vector<Eigen::Index> told = columns_with_effect(length, error, least);
     const auto count = static_cast<Eigen::Index>(told.size());
     Directions result{best,
                       model,
@@ -50,6 +63,7 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius, c
                       Eigen::VectorXd::Ones(p),
                       Eigen::VectorXd::Zero(p),
                       Eigen::VectorXd::Zero(p),
+                      least,
                       Eigen::MatrixXd::Zero(jacobian.rows(), p),
                       Eigen::MatrixXd::Zero(p, p)};
     for (const Eigen::Index j : told) {
@@ -94,7 +108,7 @@ Directions take_apart(const Run& best, const LocalModel& model, double radius) {
 
 }  // namespace
 
-bool Directions::resolved(Eigen::Index k) const { return singular[k] > std::max(resolution * singular[0], 2 * error[k]); }
+bool Directions::resolved(Eigen::Index k) const { return singular[k] > std::max(resolution * singular[0], least * error[k]); }
 
 bool Directions::wider_would_tell() const {
     for (Eigen::Index k = 0; k < singular.size(); ++k) {

@@ -22,6 +22,7 @@ struct Directions {
     Eigen::VectorXd scale;     // of x: 1 / length of J's columns [parameters]
     Eigen::VectorXd singular;  // falling [parameters]
     Eigen::VectorXd error;     // one sigma of each singular value, by the model's scatter [parameters]
+    double least = 2;          // times its error that a singular value must be, to be told from zero
     Eigen::MatrixXd u;         // [residuals x parameters]
     Eigen::MatrixXd v;         // in scaled x [parameters x parameters]
 

@@ -1,5 +1,6 @@
 #include "inverse/uncertainty.hpp"
 #include "inverse/differences.hpp"
+#include "inverse/directions.hpp"
 #include "inverse/fit.hpp"
 #include "tests/inverse/bar_scene.hpp"
 #include "tests/inverse/fake_wedge.hpp"
@@ -9,10 +10,83 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <random>
 
 namespace crampfit::testing {
 namespace {
+
+// A model of two parameters whose sum does much and whose difference, over one step of the differences, changes the residuals by
+// `lengths` times the scatter of one run to another. All residuals scatter each by itself, or all together.
+class ScatteringModel {
+  public:
+    ScatteringModel(double lengths, bool together, int draw) : lengths_(lengths), together_(together), draw_(draw) {}
+
+    Evaluation operator()(const Eigen::VectorXd& x, int) const {
+        constexpr int count = 80;
+        Eigen::VectorXd sum(count), difference(count), noise(count);
+        std::mt19937_64 random(seed(x));
+        std::normal_distribution<double> normal;
+        const double common = normal(random);
+        for (int i = 0; i < count; ++i) {
+            sum[i] = 0.3 + std::sin(3.0 * i / count);
+            difference[i] = std::cos(5.0 * i / count);
+            noise[i] = together_ ? common * std::sin(7.0 * i / count) : normal(random);
+        }
+        difference *= std::sqrt(together_ ? 0.5 * count : count) / difference.norm();
+        Evaluation evaluation;
+        evaluation.residuals = 100 * (x[0] + x[1] - 1) * sum + lengths_ / difference_step * (x[0] - x[1]) * difference + noise;
+        evaluation.misfit = evaluation.residuals.squaredNorm();
+        return evaluation;
+    }
+
+  private:
+    std::uint64_t seed(const Eigen::VectorXd& x) const {
+        std::uint64_t mixed = static_cast<std::uint64_t>(draw_) + 1;
+        for (const double value : x) {
+            std::uint64_t bits = 0;
+            std::memcpy(&bits, &value, sizeof bits);
+            mixed = (mixed ^ bits) * 0x9e3779b97f4a7c15;
+            mixed ^= mixed >> 29;
+        }
+        return mixed;
+    }
+
+    double lengths_;
+    bool together_;
+    int draw_;
+};
+
+// In how many of a hundred draws the direction across the sum is told from none.
+int times_told(double lengths, bool together) {
+    int told = 0;
+    for (int draw = 0; draw < 100; ++draw) {
+        Objective objective(2, ScatteringModel(lengths, together, draw), 500, 1);
+        std::mt19937_64 random(static_cast<std::uint64_t>(draw));
+        std::normal_distribution<double> normal(0.5, 0.02);
+        for (int run = 0; run < 12; ++run) {  // those of a descent
+            const double first = normal(random), second = normal(random);
+            objective.at(Eigen::Vector2d(first, second));
+        }
+        const auto directions = directions_about_best(objective, difference_step);
+        told += directions && directions->resolved(1);
+    }
+    return told;
+}
+
+TEST(UnitDirections, ScatterOfManyResidualsHidesLessThanThatOfFew) {
+    for (const bool together : {false, true}) {
+        const int none = times_told(0, together), small = times_told(0.3, together), clear = times_told(1.0, together);
+        fmt::print("residuals that scatter {}: told of no slope {} of 100, of 0.3 {}, of 1 {}\n",
+                   together ? "together" : "each by itself", none, small, clear);
+        EXPECT_LE(none, 5);
+        EXPECT_GE(clear, 99);
+        if (!together) {
+            EXPECT_GE(small, 95);
+        }
+    }
+}
 
 // Force rises with the product of two parameters, and nothing else depends on them.
 TEST(SystemUncertainty, NamesParametersThatCannotBeToldApart) {
