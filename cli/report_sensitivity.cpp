@@ -54,15 +54,17 @@ std::string indices_section(const Sensitivity& sensitivity) {
         const auto at = [low = low, high = high](double value) {
             return high > low ? 5 + 130 * (value - low) / (high - low) : 5;
         };
+        const bool has_interval = std::isfinite(index.lower_95) && std::isfinite(index.upper_95);
         markup += fmt::format(
-            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{:.4g}</td><td class=\"number\">{:.4g} to "
-            "{:.4g}</td><td>{}</td>",
-            escaped(index.output), escaped(index.parameter), escaped(index.method), escaped(index.kind), index.value,
-            index.lower_95, index.upper_95, escaped(unit_of(sensitivity, index)));
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td><td>{}</td>",
+            escaped(index.output), escaped(index.parameter), escaped(index.method), escaped(index.kind),
+            std::isfinite(index.value) ? fmt::format("{:.4g}", index.value) : "–",
+            has_interval ? fmt::format("{:.4g} to {:.4g}", index.lower_95, index.upper_95) : "–",
+            escaped(unit_of(sensitivity, index)));
         markup += fmt::format("<td><svg class=\"bar\" viewBox=\"0 0 140 14\" aria-hidden=\"true\"><path d=\"M{:.1f} 0V14\" "
                               "stroke=\"#777\" />",
                               at(0));
-        if (std::isfinite(index.lower_95) && std::isfinite(index.upper_95))
+        if (has_interval)
             markup += fmt::format("<path d=\"M{:.1f} 7H{:.1f}\" stroke=\"{}\" stroke-width=\"3\" />", at(index.lower_95),
                                   at(index.upper_95), colour::blue);
         if (std::isfinite(index.value))

@@ -71,6 +71,24 @@ double signed_depth(const Shape& shape, const Vec2& x) {
     return inside(shape, x) ? distance : -distance;
 }
 
+// A circle grown by what the middle of the facet nearest to it lies farther off than the facet itself, where this lies along it:
+// it touches when it would.
+Shape reached_by_middles(const Shape& shape, const std::vector<Facet>& facets) {
+    const auto* circle = std::get_if<Circle>(&shape);
+    if (!circle || facets.empty()) return shape;
+    const auto beyond = [&](const Vec2& x) { return std::max((x - circle->centre).norm(), circle->radius); };  // else cut off
+    double nearest = INFINITY, nearest_middle = INFINITY, along = 0.0;
+    for (const Facet& facet : facets) {
+        nearest_middle = std::min(nearest_middle, beyond(facet.position));
+        const Vec2 half = 0.5 * facet.length * left_of(facet.normal), a = facet.position - half, b = facet.position + half;
+        const double here = beyond(a + nearest_on_segment(a, b, circle->centre) * (b - a));
+        if (here >= nearest) continue;
+        nearest = here;
+        along = std::hypot(circle->radius, 0.5 * facet.length) - circle->radius;
+    }
+    return Circle{circle->centre, circle->radius + std::min(nearest_middle - nearest, along)};
+}
+
 }  // namespace
 
 bool is_small_circle(const Shape& shape, const Layout& layout) {
@@ -155,12 +173,23 @@ bool SlidingBody::surface_reaches(int facet, double along) const {
 double SlidingBody::corner_width() const { return corner_width_in_cells * body_.layout.cell.minCoeff(); }
 
 SlidingBody::SlidingBody(const Shape& shape, const Discretisation& body, double friction, const FaceFacets* faces)
-    : shape_(shape), body_(body), faces_(faces), corners_(corners_of(shape)), friction_(friction) {
+    : shape_(reached_by_middles(shape, body.facets)), body_(body), faces_(faces), corners_(corners_of(shape)),
+      friction_(friction) {
     if (is_small_circle(shape, body.layout))
         width_ = std::min(width_in_cells * body.layout.cell.maxCoeff(), width_in_radii * std::get<Circle>(shape).radius);
     add_facets();
     for (int i = 0; i < outline(); ++i) find_joint(i);
     for (int i = 0; i < outline(); ++i) find_holds(i);
+}
+
+std::vector<const Facet*> SlidingBody::nearest_facets(double beyond) const {
+    double most = -INFINITY;
+    for (const Facet& f : body_.facets) most = std::max(most, signed_depth(shape_, f.position));
+    std::vector<const Facet*> nearest;
+    for (const Facet& f : body_.facets)
+        if (const double depth = signed_depth(shape_, f.position); depth >= most - beyond)
+            nearest.insert(depth == most ? nearest.begin() : nearest.end(), &f);
+    return nearest;
 }
 
 void SlidingBody::add_facets() {

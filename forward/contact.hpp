@@ -27,7 +27,8 @@ bool is_small_circle(const Shape& shape, const Layout& layout);
 /// across. What a facet overlaps the body by at the start, in a picture's steps or by rounding, is taken for cut off.
 ///
 /// A convex corner of a polygon pushes against the wood's own normal, on the surface within a cell of it, where that lies well
-/// between the normals of the corner's sides and the surface goes on beyond it: else wood that gives way on either side of a sharp edge would be pinched by them.
+/// between the normals of the corner's sides and the surface goes on beyond it: else wood that gives way on either side of a
+/// sharp edge would be pinched by them.
 ///
 /// A crack that is closed ends at a body that presses on its mouth: faces feel only what comes from within the crack, the sides
 /// of a body whose normals lie within 60 degrees of the wood's own, and as deep as it is where they are the same.
@@ -48,6 +49,9 @@ class SlidingBody {
     void let_yield(std::shared_ptr<LocalYield> yield);
     const std::shared_ptr<LocalYield>& yield() const { return yield_; }  // null: it does not
     const Shape& shape() const { return shape_; }
+
+    /// Of the outline, what lies nearest to it at the start, and behind that what lies no more than `beyond` farther [m].
+    std::vector<const Facet*> nearest_facets(double beyond) const;
 
     /// Finds where it pushes on the specimen, `moved` so far [m].
     void meet(const Vec2& moved, const std::vector<Vec2>& displacement);

@@ -44,6 +44,9 @@ constexpr int most_trials = 12;  // of a part of a Newton step
 // Equilibrium does not hang on it: it is in no force.
 constexpr double loose_stiffness = 0.01;
 
+// Of the load, what a guide may take: less than any friction would hold.
+constexpr double most_on_guide = 0.01;
+
 // No smaller force counts in that than one that strains a cell of the stiffest wood by this much.
 constexpr double least_strain = 1e-5;
 
@@ -77,6 +80,8 @@ Equilibrium::Equilibrium(const Scene& scene, const Plan& plan, const MaterialMap
     find_free_bodies();
     const auto goes_through = [](const CrackLine& line) { return !line.start.inside && !line.end.inside; };
     if (!cracks_.lines.empty()) find_pieces(std::ranges::any_of(cracks_.lines, goes_through));
+    mass_ = field_masses(body_, cracks_.fields());
+    find_guides();
     renumber();
     find_forces();
 }
@@ -94,6 +99,7 @@ void Equilibrium::renumber() {
             if (free_[k].driver == held.driver && free_[k].axis == held.axis) free_of_dof_[dof] = static_cast<int>(k);
     }
     for (const int dof : pieces_.holds) equation_[dof] = -1;
+    for (const int dof : guides_) equation_[dof] = -1;
     std::vector<int> count(body_.layout.nodes(), 0);
     for (int dof = 0; dof < 2 * fields; ++dof) {
         if (mass_[dof / 2] == 0.0) equation_[dof] = -1;
@@ -537,7 +543,10 @@ Equilibrium::Outcome Equilibrium::solve(double time) {
         if (!(scale < INFINITY)) return Outcome::not_converged;
         const double before = std::exchange(residual, largest_residual());
         if (residual <= balance * scale) {
-            if (loose_ && !factor()) return Outcome::mechanism;
+            const bool is_at_rest = residual == 0.0;  // no body has come to press
+            if (loose_ && !is_at_rest && !factor()) return Outcome::mechanism;
+            const auto is_pulled = [&](int guide) { return std::abs(force_[guide / 2][guide % 2]) > most_on_guide * scale; };
+            if (std::ranges::any_of(guides_, is_pulled)) return Outcome::mechanism;
             settle();
             return Outcome::solved;
         }
@@ -606,6 +615,12 @@ double Equilibrium::negligible_work() const {
     double way = 0.0;
     for (int driver = 0; driver < boundary_.drivers(); ++driver) way = std::max(way, place_of(driver).norm());
     return balance * least_force_ * way;
+}
+
+double Equilibrium::negligible_power() const {
+    double speed = 0.0;
+    for (int driver = 0; driver < boundary_.drivers(); ++driver) speed = std::max(speed, boundary_.velocity_of(driver).norm());
+    return least_force_ * speed;
 }
 
 double Equilibrium::power() const {

@@ -60,6 +60,7 @@ class Equilibrium {
     double measured_displacement(double time) const;                  // of the edge or body that is measured, the way it goes [m]
     const std::vector<Vec2>& reactions() const { return reaction_; }  // what each driver puts on the specimen [N]
     double negligible_work() const;                                   // of forces that count as none, on the drivers' way [J]
+    double negligible_power() const;                                  // of such forces [W]
     double power() const;                                             // of what prescribes motion, dPi/dt at standing cracks [W]
     TipLoad load_at(int crack, bool at_end) const { return load_at(crack, at_end, displacement_, materials_); }
     double reciprocal_condition() const { return factor_.reciprocal_condition(); }  // of the last tangent, roughly
@@ -204,6 +205,8 @@ class Equilibrium {
     std::vector<Vec2> face_forces() const;
     void find_free_bodies();
     void find_pieces(bool crumbs_only);
+    void find_guides();
+    int field_near(const Vec2& place) const;
     void seat(int sliding);
     void settle();
     void set_contacts(const Contacts& contacts);
@@ -259,6 +262,7 @@ class Equilibrium {
     bool side_by_side_;  // what does not hang together
     GridFactor factor_;
     LoosePieces pieces_;         // that cracks have cut free
+    std::vector<int> guides_;    // components of displacement that stay, 2 x field + axis, along which nothing holds the specimen
     std::vector<int> hinges_;    // components of displacement with a spring in the tangent, 2 x field + axis
     bool loose_ = false;         // whether weak springs hold the specimen in the tangent until bodies do
     std::vector<int> equation_;  // [2 x fields] its equation, or -1: prescribed or without points

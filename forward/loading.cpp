@@ -85,13 +85,14 @@ Travel travel_of(const Scene& scene) {
     return travel;
 }
 
+bool slides_along(const Scene& scene, int axis) {
+    const auto slides = [](const Body& body) { return body.contact.kind == Contact::Kind::frictionless; };
+    const auto holds = [axis](const Edge& edge) { return edge.velocity[axis].has_value(); };
+    return std::ranges::all_of(scene.bodies, slides) && std::ranges::none_of(scene.edges, holds);
+}
+
 std::string advice_on_holds(const Scene& scene) {
-    const bool slides =
-        std::ranges::all_of(scene.bodies, [](const Body& body) { return body.contact.kind == Contact::Kind::frictionless; });
-    const auto is_held = [&](int axis) {
-        return std::ranges::any_of(scene.edges, [axis](const Edge& edge) { return edge.velocity[axis].has_value(); });
-    };
-    return slides && !(is_held(0) && is_held(1))
+    return slides_along(scene, 0) || slides_along(scene, 1)
                ? "; along one axis frictionless bodies alone hold the specimen: hold it at an edge, or give one of them friction"
                : "";
 }

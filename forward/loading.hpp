@@ -34,6 +34,9 @@ double farthest_motion(const Scene& scene, double end);
 /// toughness and the softest wood's stiffness, and half as far again for arrests [m].
 double splitting_motion(const Scene& scene, const Discretisation& body);
 
+/// Whether bodies without friction alone, or nothing, hold the specimen along an axis.
+bool slides_along(const Scene& scene, int axis);
+
 /// What to say besides where no equilibrium is found: that along some axis frictionless bodies alone hold the specimen; else
 /// empty.
 std::string advice_on_holds(const Scene& scene);

@@ -46,9 +46,9 @@ constexpr int farthest_back = 3;
 // Part by which the change of the potential over a loading step may differ from the load's work by its ends (trapezoid rule).
 constexpr double most_disagreement = 0.1;
 
-// Part by which the potential may rise as a crack grows at the same time, where no body could have come to press elsewhere: where
-// a crack turns sharply the grid's does (`HardPath.ASharpTurn*`, by 0.1 %).
-constexpr double most_rise = 0.005;
+// Part by which the potential may rise as a crack grows at the same time, where no body has come to press elsewhere, as its power
+// would tell: where a crack turns sharply the grid's does (`HardPath.ASharpTurn*`, by 0.1 %).
+constexpr double most_rise = 0.005, as_before = 0.01;
 
 // At which equilibria are sought: in so many steps at least, none of which goes over a stop of something that moves. Right behind
 // a stop comes a time of its own, as the power of the load jumps there [s]. The first step is halved `halvings` times.
@@ -342,8 +342,11 @@ bool Quasistatic::solve_from(double potential, double power, double from, double
     const double change = equilibrium_.potential() - potential;
     const double rounding = 1e-6 * std::abs(potential) + equilibrium_.negligible_work();
     // With friction the potential holds what has been dissipated, known to the trapezoid rule of a step.
-    const double rise = plan_.friction ? most_disagreement : scene_.bodies.empty() ? most_rise : 0.0;
+    const bool presses_as_before = scene_.bodies.empty() || std::abs(equilibrium_.power() - power) <= as_before * std::abs(power);
+    const double rise = plan_.friction ? most_disagreement : presses_as_before ? most_rise : 0.0;
     if (time == from) return change <= rise * std::abs(potential) + rounding;
+    // What touches first may be far from a spring; energies of forces that count as none tell nothing.
+    if (std::max(std::abs(power), std::abs(equilibrium_.power())) <= equilibrium_.negligible_power()) return true;
     const double added = 0.5 * (power + equilibrium_.power()) * (time - from);
     if (power == 0.0) return change <= (1.0 + most_disagreement) * added + rounding;  // what comes to touch on the way adds less
     const double most = most_disagreement * std::max(std::abs(change), std::abs(added)) + rounding;

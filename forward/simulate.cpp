@@ -72,7 +72,10 @@ void draw_frames(const Scene& scene, const Plan& plan, const MaterialMap& materi
             return;
         }
         const Instant& instant = instant_of_frame(record, k, scene.output.frames);
-        if (!revisit.to(record, {static_cast<std::size_t>(&instant - record.series.data()), 0.0})) return;
+        if (!revisit.to(record, {static_cast<std::size_t>(&instant - record.series.data()), 0.0})) {
+            record.message += fmt::format("; frames end before {:.4g} s, where no equilibrium was found again", instant.time);
+            return;
+        }
         record.frames.push_back(make_frame(scene, plan, revisit.body(), revisit.equilibrium().displacements()));
         Frame& frame = record.frames.back();
         frame.time = instant.time;

@@ -64,6 +64,41 @@ bool leaves_no_box(const std::vector<Run>& runs, std::size_t output) {
     return static_cast<double>(lacking(runs, output)) > 0.01 * static_cast<double>(good);
 }
 
+bool has_failed(const Run& run) { return !run.evaluation->usable() && !was_stopped(*run.evaluation); }
+
+// The same of runs that failed, where it is the parameters that made them fail and not chance: then their means, squares and
+// products are not those of as many runs drawn from all.
+bool failures_leave_no_box(const std::vector<Run>& runs) {
+    constexpr double most_chance = 4;  // standard deviations
+    const auto all = static_cast<double>(runs.size()), failed = static_cast<double>(std::ranges::count_if(runs, has_failed));
+    if (failed <= 0.01 * all || failed == all) {
+        return false;
+    }
+    const auto hangs_on = [&](const auto& quantity) {
+        double sum = 0, squares = 0, sum_of_failed = 0;
+        for (const Run& run : runs) {
+            const double q = quantity(run.x);
+            sum += q;
+            squares += q * q;
+            sum_of_failed += has_failed(run) ? q : 0.0;
+        }
+        const double mean = sum / all, variance = squares / all - mean * mean;
+        return std::abs(sum_of_failed - failed * mean) > most_chance * std::sqrt(failed * (1 - failed / all) * variance);
+    };
+    const Eigen::Index p = runs.front().x.size();
+    for (Eigen::Index i = 0; i < p; ++i) {
+        if (hangs_on([i](const Eigen::VectorXd& x) { return x[i]; })) {
+            return true;
+        }
+        for (Eigen::Index j = 0; j <= i; ++j) {
+            if (hangs_on([i, j](const Eigen::VectorXd& x) { return (x[i] - 0.5) * (x[j] - 0.5); })) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 // One output's values at all points; not a number where it could not be had.
 std::vector<double> values_of(const Evaluations& evaluations, std::size_t output) {
     std::vector<double> values;
@@ -203,7 +238,7 @@ void apply_method(const Study& study, const UnitBox& box, Objective& objective, 
     case SensitivityMethod::sobol: {
         const SaltelliDesign design(box.size(), samples > 0 ? samples : default_rows, seed);
         for_each_output(design.points(), [&](std::size_t k, std::vector<double> values) {
-            if (leaves_no_box(objective.runs(), k)) {
+            if (failures_leave_no_box(objective.runs()) || leaves_no_box(objective.runs(), k)) {
                 std::ranges::fill(values, std::numeric_limits<double>::quiet_NaN());
             }
             const SaltelliDesign::Indices of_output = design.indices(values);
@@ -260,7 +295,6 @@ void fill_runs(const UnitBox& box, const std::vector<Run>& runs, Sensitivity& re
 // Failed runs and outputs that some runs do not have, counted.
 void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopped, Sensitivity& result) {
     const auto is_good = [](const Run& run) { return run.evaluation->usable(); };
-    const auto has_failed = [&](const Run& run) { return !is_good(run) && !was_stopped(*run.evaluation); };
     const auto failed = std::ranges::count_if(runs, has_failed);
     const auto good = std::ranges::count_if(runs, is_good);
     const bool told = std::ranges::any_of(result.indices, [](const SensitivityIndex& index) { return !std::isnan(index.value); });
@@ -268,8 +302,12 @@ void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopp
     result.message = fmt::format("{} runs ended well", good) + result.message;
     if (failed > 0) {
         const auto first = std::ranges::find_if(runs, has_failed);
-        result.message +=
-            fmt::format("; {} of {} runs failed and are left out; the first: {}", failed, runs.size(), first->evaluation->status);
+        const bool no_box = method == SensitivityMethod::sobol && failures_leave_no_box(runs);
+        result.message += fmt::format("; {} of {} runs failed {}; the first: {}", failed, runs.size(),
+                                      no_box ? "where the parameters made them, and without them these are not independent any "
+                                               "more: no Sobol indices; narrow the box"
+                                             : "and are left out",
+                                      first->evaluation->status);
     }
     for (std::size_t k = 0; k < result.outputs.size() && good > 0; ++k) {
         if (const auto without = lacking(runs, k); without > 0) {

@@ -300,6 +300,83 @@ TEST(VerificationPlates, RollersAloneHoldABeam) {
     EXPECT_THROW(simulate(scene), InputError);
 }
 
+// A beam of 50 x 10 mm with a crack that lies on two rollers; a third comes down on it. All just touch, or the third comes from
+// farther off.
+Scene three_rollers(double radius, double gap) {
+    Scene scene = block({50e-3, 10e-3}, 1e-3);
+    scene.edges.clear();
+    scene.bodies = {sliding("load", Circle{Vec2(25e-3, 10e-3 + radius + gap), radius}, {0.0, -1e-6}),
+                    sliding("left", Circle{Vec2(5e-3, -radius), radius}, {0.0, 0.0}),
+                    sliding("right", Circle{Vec2(45e-3, -radius), radius}, {0.0, 0.0})};
+    Crack crack;
+    crack.points = {Vec2(25e-3, 0.0), Vec2(25e-3, 5e-3)};
+    scene.cracks = {crack};
+    scene.measure = {"load", "load"};
+    scene.solver.kind = SolverKind::quasistatic;
+    scene.output.frames = 3;
+    return scene;
+}
+
+TEST(UnitContact, RollersThatJustTouchHoldABeam) {
+    for (const double friction : {0.0, 0.3})
+        for (const double radius : {2e-3, 5e-3}) {
+            double stiffness = 0.0;
+            for (const double travel : {0.02e-3, 0.05e-3, 0.2e-3}) {
+                Scene scene = three_rollers(radius, 0.0);
+                for (Body& roller : scene.bodies)
+                    roller.contact = {friction > 0.0 ? Contact::Kind::friction : Contact::Kind::frictionless, friction};
+                scene.stop.displacement = travel;
+                const Record record = simulate(scene);
+                ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+                EXPECT_EQ(record.frames.size(), 3u);  // the first before anything presses
+                const double force = record.series.back().force;
+                for (const std::size_t support : {1u, 2u})
+                    EXPECT_NEAR(record.reactions[support].force.back().y() / force, 0.5, 1e-3);
+                if (stiffness == 0.0) stiffness = force / travel;
+                EXPECT_NEAR(force / travel / stiffness, 1.0, 0.05);
+            }
+            std::printf("rollers of %.0f mm, friction %.1f: %.3f N/mm\n", 1e3 * radius, friction, 1e-3 * stiffness);
+        }
+}
+
+TEST(UnitContact, NothingCarriesLoadUntilTheRollersTouch) {
+    const double gap = 0.1e-3;
+    Scene far = three_rollers(2e-3, gap), near = three_rollers(2e-3, 0.0);
+    far.stop.displacement = 0.3e-3;
+    near.stop.displacement = 0.2e-3;
+    const Record late = simulate(far), at_once = simulate(near);
+    ASSERT_EQ(late.status, RunStatus::finished) << late.message;
+    EXPECT_NEAR(late.series.back().force / at_once.series.back().force, 1.0, 2e-3);
+    for (const Instant& row : late.series) {
+        if (row.displacement < 0.9 * gap) {
+            EXPECT_EQ(row.force, 0.0);
+        }
+    }
+}
+
+// Nothing says where along the platens they stand, nor, for the disk, how it is turned.
+TEST(UnitContact, SmoothPlatensHoldABlockAndADisk) {
+    for (const bool is_disk : {false, true}) {
+        Scene scene = block({10e-3, 10e-3}, 0.5e-3);
+        if (is_disk) scene.specimen.parts.push_back({Circle{Vec2(5e-3, 5e-3), 5e-3}});
+        scene.edges.clear();
+        const auto platen = [](double low) {
+            return Polygon{{Vec2(-5e-3, low), Vec2(15e-3, low), Vec2(15e-3, low + 3e-3), Vec2(-5e-3, low + 3e-3)}};
+        };
+        scene.bodies = {sliding("high", platen(10e-3), {0.0, -1e-6}), sliding("low", platen(-3e-3), {0.0, 0.0})};
+        scene.measure = {"high", "high"};
+        scene.solver.kind = SolverKind::quasistatic;
+        scene.stop.displacement = 0.1e-3;
+        const Record record = simulate(scene);
+        ASSERT_EQ(record.status, RunStatus::finished) << record.message;
+        EXPECT_NEAR(record.reactions[1].force.back().y() / record.series.back().force, 1.0, 1e-6);
+        if (is_disk) continue;
+        const Material& wood = scene.materials.at("EW");
+        const double modulus = wood.youngs_modulus / (1 - std::pow(wood.poisson_ratio, 2));
+        EXPECT_NEAR(record.series.back().force / (modulus * 0.01 * 10e-3 * scene.model.thickness), 0.99, 0.01);  // platens yield
+    }
+}
+
 // Checks F_H = F_V / (2 tan(A / 2)), without friction (REFERENCES), and returns how far off it is.
 double statics_error(const Scene& scene, double angle, double travel) {
     Rest rest(scene);

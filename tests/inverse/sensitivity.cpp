@@ -353,6 +353,28 @@ TEST(SystemSensitivity, GivesTheSameBitsForAnyNumberOfThreadsAndCountsFailedRuns
     }
 }
 
+// What is left of a box without one of its corners says less of one parameter than of both.
+TEST(SystemSensitivity, NoSobolIndicesWhereTheParametersMadeRunsFail) {
+    Study study = output_study(SensitivityMethod::sobol, 64);
+    const Parameter &first = study.parameters[0], &second = study.parameters[1];
+    SensitivityOptions options;
+    options.forward = [&](const Scene& scene, const std::atomic<bool>*) {
+        const auto share = [&](const Parameter& parameter) {
+            return (get_number(scene, parameter.keys[0]) - parameter.lower) / (parameter.upper - parameter.lower);
+        };
+        if (share(first) > 0.6 && share(second) > 0.6) {
+            throw std::runtime_error("lost");
+        }
+        return FakeWedge{}(scene);
+    };
+    const Sensitivity result = study_sensitivity(study, options);
+    EXPECT_NE(result.message.find("not independent any more: no Sobol indices"), std::string::npos) << result.message;
+    ASSERT_FALSE(result.indices.empty());
+    for (const SensitivityIndex& index : result.indices) {
+        EXPECT_TRUE(std::isnan(index.value)) << index.output;
+    }
+}
+
 // Where a rest ends lies between rows of the record, which stand at the same displacements whatever the wood.
 TEST(GradientSensitivity, EndsOfRestsMoveAsRunsSay) {
     Study study;
