@@ -1,4 +1,4 @@
-// Springs in the tangent, and in no force, for what nothing holds yet or hardly anything does.
+// What keeps a specimen that nothing holds yet, or hardly anything does: springs in the tangent and in no force, places that stay.
 #include "forward/equilibrium.hpp"
 #include "forward/loading.hpp"
 
