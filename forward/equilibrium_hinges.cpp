@@ -1,4 +1,4 @@
-// What keeps a specimen that nothing holds yet, or hardly anything does: springs in the tangent and in no force, places that stay.
+// What keeps a specimen that nothing or hardly anything holds: springs in the tangent and in no force, places that stay.
 #include "forward/equilibrium.hpp"
 #include "forward/loading.hpp"
 
