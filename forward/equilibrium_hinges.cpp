@@ -39,7 +39,7 @@ void Equilibrium::add_hinges() {
 // beside it where the specimen may roll too, as a disk does between platens.
 void Equilibrium::find_guides() {
     constexpr double most_aslant = 0.15;  // of a surface, sine
-    constexpr double near = 0.02;         // in cells
+    constexpr double near = 0.02;         // in cells: on a disk of ten cells' radius a sixteenth of that to either side
     constexpr double narrow = 0.2;        // of the specimen
     for (int axis = 0; axis < 2; ++axis) {
         if (sliding_.empty() || !slides_along(scene_, axis)) continue;

@@ -304,8 +304,8 @@ void conclude(const std::vector<Run>& runs, SensitivityMethod method, bool stopp
         const auto first = std::ranges::find_if(runs, has_failed);
         const bool no_box = method == SensitivityMethod::sobol && failures_leave_no_box(runs);
         result.message += fmt::format("; {} of {} runs failed {}; the first: {}", failed, runs.size(),
-                                      no_box ? "where the parameters made them, and without them these are not independent any "
-                                               "more: no Sobol indices; narrow the box"
+                                      no_box ? "where the parameters made them, and without those the parameters are not "
+                                               "independent any more: no Sobol indices; narrow the box"
                                              : "and are left out",
                                       first->evaluation->status);
     }

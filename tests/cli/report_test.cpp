@@ -220,6 +220,7 @@ TEST(SystemReport, PageOfASensitivityStudy) {
     for (const char* part :
          {"0.4 to 0.6", "<td>N / (MPa)</td>", "<td>local</td>", "2 of 3 runs ended well", "failed &lt;hard&gt;", "elasticity"})
         EXPECT_TRUE(contains(page, part)) << part;
+    EXPECT_FALSE(contains(page, "nan"));
 }
 
 TEST(SystemReport, PageOfASpecimen) {
